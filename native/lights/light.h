@@ -1,0 +1,43 @@
+// The light contract: what illuminates a point, how to sample it, and the density of a chance hit.
+//
+// A LightSample's pdf includes the choice of the light and is per solid angle as seen from the context
+// point; a delta light's pdf is the discrete probability of its choice and its L already holds the
+// inverse-square law (so contribution = f_cos * L / pdf in both cases). Chance hits use the same
+// context as sampling did: the *previous* vertex.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/math.h"
+
+namespace pharos {
+
+// The receiving vertex: all a light may look at.
+struct LightSampleContext {
+    Vec3 p;
+    Vec3 n;                  // shading normal on wo's side
+    bool transmits = false;  // the surface also receives light from behind n
+};
+
+struct LightSample {
+    Rgb L{0.0f};
+    Vec3 wi;                  // unit, from the context point to the light
+    float pdf = 0.0f;
+    float distance = 0.0f;    // kInfinity for sun and world
+    bool delta = false;
+    bool cast_shadow = true;
+    std::uint32_t visibility = 31;  // of the light, for the receiving lobe's type
+    std::uint32_t max_bounces = 1024;
+};
+
+// Emission met by a ray, and the density next-event estimation would have had for it.
+struct LightHit {
+    Rgb L{0.0f};
+    float pdf = 0.0f;   // solid angle, choice included; 0: not sampled by NEE
+    float distance = 0.0f;
+    std::uint32_t light = 0;
+    std::uint32_t visibility = 31;
+};
+
+}  // namespace pharos

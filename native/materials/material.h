@@ -1,0 +1,94 @@
+// Materials ready to shade: node programs with what can be known of them before a render, and their
+// evaluation over batches of hits.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/math.h"
+#include "core/scene_report.h"
+#include "geometry/accelerator.h"
+#include "geometry/mesh.h"
+#include "geometry/surface_interaction.h"
+#include "image/texture.h"
+#include "materials/bsdf.h"
+#include "materials/node_program.h"
+
+namespace pharos {
+
+// A checked program: every operand, register, table and image index is in range.
+struct Material {
+    std::string name;
+    NodeProgram program;
+    bool constant = false;      // no value operation: closures follow from constants alone
+    bool emits = false;         // holds an Emission (or a Principled whose emission may be > 0)
+    bool scatters = false;      // holds any other closure
+    bool transparent = false;   // holds a Transparent closure: shadow rays must ask it
+    bool transmits = false;     // light arrives from behind the shading normal
+    bool textured = false;      // reads an image
+    bool emission_sampling = true;
+    Rgb emission_estimate{0.0f};  // mean emitted radiance, for light choice
+};
+
+// Checks `program` (a broken index is reported and the material becomes grey diffuse).
+[[nodiscard]] Material compile_material(std::string name, NodeProgram program, SceneReport& report);
+
+// What programs read besides the hits. All spans outlive the call.
+struct ShadingContext {
+    std::span<const Mesh> meshes;
+    std::span<const Instance> instances;
+    std::span<const Texture> textures;  // index = SceneDescription::images
+    std::uint32_t blender_version = 304;
+    Mat4 world_to_camera{1.0f};
+};
+
+// Working memory of one thread, reused from call to call so that shading does not allocate.
+struct ShadingScratch {
+    std::vector<float> registers;
+};
+
+// Closures of a batch: path i has closures [first[i], first[i] + count[i]) and emitted radiance.
+struct ClosureBatch {
+    std::vector<Closure> closures;
+    std::vector<std::uint32_t> first;
+    std::vector<std::uint32_t> count;
+    std::vector<Rgb> emission;
+    std::uint64_t dropped_closures = 0;
+
+    void reset(std::size_t hits);  // clears closures, sizes the per-hit arrays
+};
+
+// Evaluates `material` at hits[index[i]] for every i, filling out's entries of those indices.
+// Emission is zero when only scattering is asked for and the other way round costs less.
+void evaluate_surfaces(const Material& material,
+                       const ShadingContext& context,
+                       std::span<const SurfaceInteraction> hits,
+                       std::span<const std::uint32_t> index,
+                       ShadingScratch& scratch,
+                       ClosureBatch& out);
+
+// Emission alone (next-event estimation towards emissive triangles).
+void evaluate_emission(const Material& material,
+                       const ShadingContext& context,
+                       std::span<const SurfaceInteraction> hits,
+                       ShadingScratch& scratch,
+                       std::span<Rgb> emission);
+
+// Transmittance of transparent closures (shadow rays).
+void evaluate_transparency(const Material& material,
+                           const ShadingContext& context,
+                           std::span<const SurfaceInteraction> hits,
+                           ShadingScratch& scratch,
+                           std::span<Rgb> transmittance);
+
+// World radiance along directions (from the camera outwards).
+void evaluate_world(const Material& world,
+                    const ShadingContext& context,
+                    std::span<const Vec3> directions,
+                    ShadingScratch& scratch,
+                    std::span<Rgb> radiance);
+
+}  // namespace pharos
