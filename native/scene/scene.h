@@ -1,0 +1,58 @@
+// A scene ready to trace: immutable, shared by all threads.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/cancel.h"
+#include "core/scene_report.h"
+#include "geometry/accelerator.h"
+#include "image/texture.h"
+#include "lights/environment_light.h"
+#include "lights/light_sampler.h"
+#include "materials/material.h"
+#include "scene/scene_description.h"
+
+namespace pharos {
+
+// What a scene does not need is decided once, here.
+struct SceneNeeds {
+    bool lamps_hittable = false;
+    bool emissive_triangles = false;
+    bool environment = false;         // the world is not black
+    bool constant_environment = false;
+    bool transparency = false;        // some material lets shadow rays through
+    bool textures = false;
+    bool all_constant = false;        // no material runs a node program
+    bool nee = false;                 // there is something to sample
+};
+
+struct Scene {
+    SceneDescription description;  // meshes, camera, film, settings (images' pixels are moved out)
+    std::vector<Instance> instances;
+    std::vector<Material> materials;  // one per description.materials, then the grey default
+    std::vector<Texture> textures;
+    Material world;
+    Rgb constant_world{0.0f};
+    std::unique_ptr<EnvironmentLight> environment;
+    std::unique_ptr<LightSampler> lights;
+    std::unique_ptr<Accelerator> accelerator;
+    Bounds3 bounds;
+    SceneNeeds needs;
+    ShadingContext shading;  // spans into this scene
+
+    // Hit to interaction: position with its error bound, normals on wo's side, material.
+    [[nodiscard]] SurfaceInteraction interaction(const Ray& ray, const Hit& hit) const;
+
+    [[nodiscard]] std::uint64_t bytes() const;
+};
+
+// Validates, reports and mends the description and builds everything a render needs. Polls `cancel`
+// and throws Cancelled.
+[[nodiscard]] std::unique_ptr<const Scene> build_scene(SceneDescription description,
+                                                       const CancelFlag& cancel,
+                                                       SceneReport& report);
+
+}  // namespace pharos

@@ -1,0 +1,82 @@
+// A render from description to finished passes on threads of its own; hosts start, poll, read, cancel.
+//
+// All functions are thread-safe and return at once, except wait(), read() (copies a pass: some
+// milliseconds) and the destructor (cancels and joins). Nothing here calls back into the host.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/scene_report.h"
+#include "film/film.h"
+#include "scene/scene_description.h"
+
+namespace pharos {
+
+enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelled, Failed };
+
+struct SessionProgress {
+    SessionState state = SessionState::Building;
+    std::string error;              // state Failed: one sentence
+    std::uint32_t samples = 0;      // finished passes of the whole frame
+    std::uint32_t total_samples = 0;
+    std::uint64_t serial = 0;       // grows whenever the picture has changed
+    double fraction = 0.0;          // 0 ... 1, including the time limit
+    double elapsed = 0.0;           // seconds since start of rendering
+    double remaining = 0.0;         // estimate, seconds
+    double noise = 1.0;             // Film::noise()
+    std::uint64_t memory_bytes = 0; // scene and film
+    std::uint64_t nonfinite_samples = 0;
+};
+
+// Work per stage, for --stats and the benchmarks.
+struct StageStatistics {
+    std::string name;
+    std::uint64_t items = 0;
+    double seconds = 0.0;  // summed over threads
+};
+
+struct SessionStatistics {
+    std::vector<StageStatistics> stages;
+    std::uint64_t camera_samples = 0;
+    std::uint64_t vertices = 0;
+    std::uint64_t rays = 0;
+    double build_seconds = 0.0;
+    double render_cpu_seconds = 0.0;  // process CPU time of passes and training
+};
+
+class RenderSession {
+  public:
+    // Takes the description; work begins at once on threads of the session. threads 0: one per core.
+    explicit RenderSession(SceneDescription description, unsigned threads = 0);
+    ~RenderSession();
+    RenderSession(const RenderSession&) = delete;
+    RenderSession& operator=(const RenderSession&) = delete;
+
+    void cancel();
+
+    // True when the render has ended (finished, cancelled or failed) within the time.
+    bool wait(std::chrono::milliseconds time) const;
+
+    [[nodiscard]] SessionProgress progress() const;
+    [[nodiscard]] SessionStatistics statistics() const;
+    [[nodiscard]] std::vector<ReportEntry> report() const;
+
+    [[nodiscard]] std::uint32_t width() const;  // of the rendered window
+    [[nodiscard]] std::uint32_t height() const;
+
+    // The newest complete state of a pass: width * height * film_pass_channels(pass) floats, bottom row
+    // first. False while there is no picture yet (out is untouched). Throws std::invalid_argument for a
+    // wrong size.
+    bool read(FilmPass pass, std::span<float> out) const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pharos
