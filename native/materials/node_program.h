@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "image/image_sampling.h"
+
 namespace pharos {
 
 inline constexpr std::int32_t kDefaultOperand = std::numeric_limits<std::int32_t>::min();
@@ -69,8 +71,6 @@ struct NodeOp {
     std::uint32_t operand_count = 0;
 };
 
-enum class ImageInterpolation : std::uint32_t { Linear, Closest, Cubic, Smart };
-enum class ImageExtension : std::uint32_t { Repeat, Extend, Clip, Mirror };
 enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectangular, MirrorBall };
 
 struct ImageUse {
