@@ -23,12 +23,12 @@ namespace pharos {
 struct Material {
     std::string name;
     NodeProgram program;
-    bool constant = false;      // no value operation: closures follow from constants alone
-    bool emits = false;         // holds an Emission (or a Principled whose emission may be > 0)
-    bool scatters = false;      // holds any other closure
-    bool transparent = false;   // holds a Transparent closure: shadow rays must ask it
-    bool transmits = false;     // light arrives from behind the shading normal
-    bool textured = false;      // reads an image
+    bool constant = false;     // no value operation: closures follow from constants alone
+    bool emits = false;        // holds an Emission (or a Principled whose emission may be > 0)
+    bool scatters = false;     // holds any other closure
+    bool transparent = false;  // holds a Transparent closure: shadow rays must ask it
+    bool transmits = false;    // light arrives from behind the shading normal
+    bool textured = false;     // reads an image
     bool emission_sampling = true;
     Rgb emission_estimate{0.0f};  // mean emitted radiance, for light choice
 };
@@ -36,13 +36,25 @@ struct Material {
 // Checks `program` (a broken index is reported and the material becomes grey diffuse).
 [[nodiscard]] Material compile_material(std::string name, NodeProgram program, SceneReport& report);
 
+// What the Light Path node tells of the ray that made a hit.
+struct PathInfo {
+    std::uint16_t kind = 1;  // bit LightPathOutput::Is...: the default is a camera ray
+    std::uint8_t depth = 0;
+    std::uint8_t diffuse_depth = 0;
+    std::uint8_t glossy_depth = 0;
+    std::uint8_t transparent_depth = 0;
+    std::uint8_t transmission_depth = 0;
+};
+
 // What programs read besides the hits. All spans outlive the call.
 struct ShadingContext {
     std::span<const Mesh> meshes;
     std::span<const Instance> instances;
     std::span<const Texture> textures;  // index = SceneDescription::images
     std::uint32_t blender_version = 304;
-    Mat4 world_to_camera{1.0f};
+    Mat4 world_to_camera{1.0f};       // looks along -z
+    Mat4 camera_to_window{1.0f};      // projective: the frame is [0, 1] x [0, 1]
+    std::span<const PathInfo> paths;  // of the hits or directions; empty: camera rays
 };
 
 // Working memory of one thread, reused from call to call so that shading does not allocate.

@@ -1,12 +1,14 @@
 // A material's or world's node tree as a linear list of operations, evaluated over batches of hits.
 //
 // The add-on flattens a tree into this list in dependency order. An operation reads operands and
-// writes one or more consecutive float registers; a colour or vector takes three registers, a scalar
-// one. A closure operation writes no register: it appends a scattering closure (or emission) with a
-// weight. Mix and Add Shader disappear: the flattener multiplies their factors into the weights.
+// writes one or more consecutive float registers; a colour or vector takes three registers, a
+// scalar one. A closure operation writes no register: it appends a scattering closure (or emission)
+// with a weight. Mix and Add Shader disappear: the flattener multiplies their factors into the
+// weights.
 //
 // Operand encoding: >= 0: register index of the first component; < 0: ~operand is an index into
-// `constants`; kDefaultOperand: the socket is unconnected and has the node's own default (a normal).
+// `constants`; kDefaultOperand: the socket is unconnected and has the node's own default (a
+// normal).
 #pragma once
 
 #include <cstdint>
@@ -23,25 +25,51 @@ inline constexpr std::int32_t kDefaultOperand = std::numeric_limits<std::int32_t
 // Operands are listed as name:size. "-> n" is the number of registers written.
 enum class NodeOpCode : std::uint16_t {
     // --- values ---
-    Copy = 0,            // a:mode -> mode (mode = 1 or 3 components)
-    Uv = 1,              // mode = uv map of the mesh by program name index (names[mode]; 0xffff: default) -> 3
-    Geometry = 2,        // mode = GeometryOutput -> 1 or 3
-    Coordinate = 3,      // mode = CoordinateOutput -> 3
-    Image = 4,           // vector:3; mode = image use index (images[mode]) -> 4 (rgb, alpha)
-    EnvironmentImage = 5,// direction:3; mode = image use index -> 4
-    ScalarToVector = 6,  // x:1 -> 3
-    Luminance = 7,       // color:3 -> 1
-    VectorAverage = 8,   // vector:3 -> 1
-    Math = 9,            // a:1 b:1 c:1; mode = MathMode (| kClampBit) -> 1
-    VectorMath = 10,     // a:3 b:3 c:3 scale:1; mode = VectorMathMode -> 3 (value results in the first)
-    MixColor = 11,       // factor:1 a:3 b:3; mode = BlendMode (| kClampBit result | kClampFactorBit) -> 3
-    MixFloat = 12,       // factor:1 a:1 b:1; mode = clamp bits -> 1
-    Mapping = 13,        // vector:3 location:3 rotation:3 scale:3; mode = 0 point 1 texture 2 vector 3 normal -> 3
-    Ramp = 14,           // x:1; mode = table index, linearly interpolated RGBA rows -> 4
-    Combine = 15,        // x:1 y:1 z:1 -> 3
-    Fresnel = 16,        // ior:1 normal:3 -> 1
-    LayerWeight = 17,    // blend:1 normal:3; -> 2 (fresnel, facing)
-    NormalMap = 18,      // strength:1 color:3; mode = 0 tangent 1 object 2 world -> 3
+    Copy = 0,              // a:mode -> mode (mode = 1 or 3 components)
+    Uv = 1,                // mode = name index (names[mode]) of a mesh's uv map, kDefaultName: its
+                           // first -> 3; a mesh without uv maps: Generated; an unknown name: 0
+    Geometry = 2,          // mode = GeometryOutput -> 1 or 3
+    Coordinate = 3,        // mode = CoordinateOutput -> 3
+    Image = 4,             // vector:3; mode = image use index (images[mode]) -> 4 (rgb, alpha)
+    EnvironmentImage = 5,  // direction:3; mode = image use index -> 4
+    ScalarToVector = 6,    // x:1 -> 3
+    Luminance = 7,         // color:3 -> 1
+    VectorAverage = 8,     // vector:3 -> 1
+    Math = 9,              // a:1 b:1 c:1; mode = MathMode (| kClampBit) -> 1
+    VectorMath = 10,   // a:3 b:3 c:3 scale:1; mode = VectorMathMode -> 3 (a value: in the first)
+    MixColor = 11,     // factor:1 a:3 b:3; mode = BlendMode (| kClampBit | kClampFactorBit) -> 3
+    MixFloat = 12,     // factor:1 a:1 b:1; mode = clamp bits -> 1
+    Mapping = 13,      // vector:3 location:3 rotation:3 scale:3; mode = MappingMode -> 3
+    Ramp = 14,         // x:1; mode = table index, RGBA rows over [0, 1] (| kStepBit: no
+                       // interpolation between rows) -> 4
+    Combine = 15,      // x:1 y:1 z:1 -> 3 (separating: name the component's register or constant)
+    Fresnel = 16,      // ior:1 normal:3 -> 1
+    LayerWeight = 17,  // blend:1 normal:3; -> 2 (fresnel, facing)
+    NormalMap = 18,    // strength:1 color:3 (| uv:3 for tangent space, else the first uv map);
+                       // mode = NormalMapSpace -> 3
+    ObjectInfo = 19,   // mode = ObjectInfoOutput -> 1 or 3
+    CameraData = 20,   // mode = CameraDataOutput -> 1 or 3
+    LightPath = 21,    // mode = LightPathOutput -> 1
+    MapRange = 22,     // x:1 from_min:1 from_max:1 to_min:1 to_max:1 steps:1; mode = MapRangeMode
+                       // (| kClampBit) -> 1
+    VectorMapRange = 23,  // the same with :3 for every operand -> 3
+    Clamp = 24,           // x:1 min:1 max:1; mode = 0 min/max, 1 range (swaps if min > max) -> 1
+    Invert = 25,          // factor:1 color:3 -> 3
+    Gamma = 26,           // color:3 gamma:1 -> 3
+    BrightContrast = 27,  // color:3 bright:1 contrast:1 -> 3
+    HueSaturation = 28,   // hue:1 saturation:1 value:1 factor:1 color:3 -> 3
+    Curves = 29,         // factor:1 value:3 minimum:1 maximum:1; mode = table index: the rows' r, g
+                         // and b are the three curves over [minimum, maximum] (| kExtrapolateBit)
+                         // -> 3. RGB, vector and float curves (float: ScalarToVector before)
+    SeparateColor = 30,  // color:3; mode = ColorModel -> 3
+    CombineColor = 31,   // a:1 b:1 c:1; mode = ColorModel -> 3
+    Checker = 32,        // vector:3 color1:3 color2:3 scale:1 -> 4 (color, factor)
+    Gradient = 33,       // vector:3; mode = GradientMode -> 1
+    VectorTransform = 34,  // vector:3; mode = from + 3 * to + 9 * type; spaces 0 world 1 object
+                           // 2 camera; type 0 vector 1 point 2 normal -> 3
+    VectorRotate = 35,     // vector:3 center:3 axis:3 angle:1 rotation:3; mode = VectorRotateMode
+                           // (| kInvertBit) -> 3
+    Blackbody = 36,        // temperature:1 -> 3 (Rec.709 of luminance 1)
     // --- closures; weight:3 is always the first operand ---
     Diffuse = 100,       // weight:3 color:3 roughness:1 normal:3
     Glossy = 101,        // weight:3 color:3 roughness:1 normal:3; mode = Distribution
@@ -55,13 +83,166 @@ enum class NodeOpCode : std::uint16_t {
     PrincipledV2 = 109,  // weight:3, then kPrincipledV2Operands; mode = Distribution
 };
 
-enum class GeometryOutput : std::uint16_t { Position, Normal, TrueNormal, Incoming, Backfacing, Parametric, Tangent };
-enum class CoordinateOutput : std::uint16_t { Generated, Normal, Uv, Object, Camera, Window, Reflection };
+enum class GeometryOutput : std::uint16_t {
+    Position,
+    Normal,
+    TrueNormal,
+    Incoming,
+    Backfacing,
+    Parametric,  // weights of the triangle's first two vertices
+    Tangent,
+};
+enum class CoordinateOutput : std::uint16_t {
+    Generated,
+    Normal,
+    Uv,
+    Object,
+    Camera,
+    Window,
+    Reflection,
+};
+enum class ObjectInfoOutput : std::uint16_t { Location, Random };
+enum class CameraDataOutput : std::uint16_t { ViewVector, ViewZDepth, ViewDistance };
+enum class LightPathOutput : std::uint16_t {
+    IsCameraRay,
+    IsShadowRay,
+    IsDiffuseRay,
+    IsGlossyRay,
+    IsSingularRay,
+    IsReflectionRay,
+    IsTransmissionRay,
+    RayLength,
+    RayDepth,
+    DiffuseDepth,
+    GlossyDepth,
+    TransparentDepth,
+    TransmissionDepth,
+};
 enum class Distribution : std::uint16_t { Sharp, Beckmann, Ggx, MultiGgx, AshikhminShirley };
+enum class MappingMode : std::uint16_t { Point, Texture, Vector, Normal };
+enum class NormalMapSpace : std::uint16_t { Tangent, Object, World };
+enum class ColorModel : std::uint16_t { Rgb, Hsv, Hsl };
+enum class MapRangeMode : std::uint16_t { Linear, Stepped, SmoothStep, SmootherStep };
+enum class VectorRotateMode : std::uint16_t { AxisAngle, XAxis, YAxis, ZAxis, EulerXyz };
+enum class GradientMode : std::uint16_t {
+    Linear,
+    Quadratic,
+    Easing,
+    Diagonal,
+    Radial,
+    QuadraticSphere,
+    Spherical,
+};
 
-// Mode bits of Math, MixColor and MixFloat.
+// Blender's operations under their names (MULTIPLY_ADD is MultiplyAdd) and numbers.
+enum class MathMode : std::uint16_t {
+    Add = 0,
+    Subtract = 1,
+    Multiply = 2,
+    Divide = 3,
+    Sine = 4,
+    Cosine = 5,
+    Tangent = 6,
+    Arcsine = 7,
+    Arccosine = 8,
+    Arctangent = 9,
+    Power = 10,
+    Logarithm = 11,
+    Minimum = 12,
+    Maximum = 13,
+    Round = 14,
+    LessThan = 15,
+    GreaterThan = 16,
+    Modulo = 17,  // truncated
+    Absolute = 18,
+    Arctan2 = 19,
+    Floor = 20,
+    Ceil = 21,
+    Fract = 22,
+    Sqrt = 23,
+    InverseSqrt = 24,
+    Sign = 25,
+    Exponent = 26,
+    Radians = 27,
+    Degrees = 28,
+    Sinh = 29,
+    Cosh = 30,
+    Tanh = 31,
+    Trunc = 32,
+    Snap = 33,
+    Wrap = 34,
+    Compare = 35,
+    MultiplyAdd = 36,
+    Pingpong = 37,
+    SmoothMin = 38,
+    SmoothMax = 39,
+    FlooredModulo = 40,
+};
+inline constexpr std::uint16_t kMathModes = 41;
+
+enum class VectorMathMode : std::uint16_t {
+    Add = 0,
+    Subtract = 1,
+    Multiply = 2,
+    Divide = 3,
+    CrossProduct = 4,
+    Project = 5,
+    Reflect = 6,
+    DotProduct = 7,
+    Distance = 8,
+    Length = 9,
+    Scale = 10,
+    Normalize = 11,
+    Snap = 12,
+    Floor = 13,
+    Ceil = 14,
+    Modulo = 15,
+    Fraction = 16,
+    Absolute = 17,
+    Minimum = 18,
+    Maximum = 19,
+    Wrap = 20,
+    Sine = 21,
+    Cosine = 22,
+    Tangent = 23,
+    Refract = 24,
+    Faceforward = 25,
+    MultiplyAdd = 26,
+    Power = 27,
+    Sign = 28,
+};
+inline constexpr std::uint16_t kVectorMathModes = 29;
+
+enum class BlendMode : std::uint16_t {
+    Mix = 0,
+    Add = 1,
+    Multiply = 2,
+    Subtract = 3,
+    Screen = 4,
+    Divide = 5,
+    Difference = 6,
+    Darken = 7,
+    Lighten = 8,
+    Overlay = 9,
+    Dodge = 10,
+    Burn = 11,
+    Hue = 12,
+    Saturation = 13,
+    Value = 14,
+    Color = 15,
+    SoftLight = 16,
+    LinearLight = 17,
+    Exclusion = 18,
+};
+inline constexpr std::uint16_t kBlendModes = 19;
+
+// Mode bits beside an operation's number or index.
 inline constexpr std::uint16_t kClampBit = 0x8000;
 inline constexpr std::uint16_t kClampFactorBit = 0x4000;
+inline constexpr std::uint16_t kStepBit = 0x8000;
+inline constexpr std::uint16_t kExtrapolateBit = 0x8000;
+inline constexpr std::uint16_t kInvertBit = 0x8000;
+inline constexpr std::uint16_t kDefaultName = 0xffff;
 
 struct NodeOp {
     NodeOpCode code = NodeOpCode::Copy;
@@ -91,16 +272,19 @@ struct NodeProgram {
     std::uint32_t register_count = 0;
 };
 
-// Operand order of the two Principled versions after weight:3 (name:size in one place for both sides).
-// V1 (Blender 3.x): base_color:3 subsurface:1 subsurface_color:3 metallic:1 specular:1 specular_tint:1
+// Operand order of the two Principled versions after weight:3 (name:size in one place for both
+// sides). V1 (Blender 3.x): base_color:3 subsurface:1 subsurface_color:3 metallic:1 specular:1
+// specular_tint:1
 //   roughness:1 anisotropic:1 anisotropic_rotation:1 sheen:1 sheen_tint:1 clearcoat:1
 //   clearcoat_roughness:1 ior:1 transmission:1 transmission_roughness:1 normal:3 clearcoat_normal:3
-//   tangent:3                                                    (emission and alpha are ops of their own)
-// V2 (Blender 4.x): base_color:3 metallic:1 roughness:1 ior:1 diffuse_roughness:1 subsurface_weight:1
+//   tangent:3                                                    (emission and alpha are ops of
+//   their own)
+// V2 (Blender 4.x): base_color:3 metallic:1 roughness:1 ior:1 diffuse_roughness:1
+// subsurface_weight:1
 //   specular_ior_level:1 specular_tint:3 anisotropic:1 anisotropic_rotation:1 transmission_weight:1
-//   coat_weight:1 coat_roughness:1 coat_ior:1 coat_tint:3 sheen_weight:1 sheen_roughness:1 sheen_tint:3
-//   emission_color:3 emission_strength:1 thin_film_thickness:1 thin_film_ior:1 alpha:1 normal:3
-//   coat_normal:3 tangent:3
+//   coat_weight:1 coat_roughness:1 coat_ior:1 coat_tint:3 sheen_weight:1 sheen_roughness:1
+//   sheen_tint:3 emission_color:3 emission_strength:1 thin_film_thickness:1 thin_film_ior:1 alpha:1
+//   normal:3 coat_normal:3 tangent:3
 inline constexpr std::uint32_t kPrincipledV1Operands = 19;
 inline constexpr std::uint32_t kPrincipledV2Operands = 26;
 
