@@ -1,0 +1,352 @@
+#include "geometry/accelerator.h"
+
+#include <atomic>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include <embree3/rtcore.h>
+
+#include "core/check.h"
+#include "core/fp_state.h"
+
+namespace pharos {
+
+namespace {
+
+constexpr std::uint32_t kCancelPollInterval = 1u << 16;  // vertices or triangles copied in between
+
+struct DeviceRelease {
+    void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
+};
+
+struct SceneRelease {
+    void operator()(RTCSceneTy* scene) const { rtcReleaseScene(scene); }
+};
+
+struct GeometryRelease {
+    void operator()(RTCGeometryTy* geometry) const { rtcReleaseGeometry(geometry); }
+};
+
+using DevicePtr = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
+using ScenePtr = std::unique_ptr<RTCSceneTy, SceneRelease>;
+using GeometryPtr = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
+
+// What Embree's callbacks see while it builds, on any of its threads.
+struct Monitor {
+    const CancelFlag* cancel = nullptr;  // null once building is over
+    std::atomic<std::int64_t> bytes{0};
+};
+
+bool on_memory(void* user, ssize_t change, bool /*post*/) {
+    auto& monitor = *static_cast<Monitor*>(user);
+    monitor.bytes.fetch_add(change, std::memory_order_relaxed);
+    // A refused allocation ends a build early; releases are never refused.
+    return change <= 0 || monitor.cancel == nullptr || !monitor.cancel->cancelled();
+}
+
+bool on_progress(void* user, double /*fraction*/) {
+    return !static_cast<const Monitor*>(user)->cancel->cancelled();
+}
+
+void throw_if_cancelled(const CancelFlag& cancel) {
+    if (cancel.cancelled()) {
+        throw Cancelled();
+    }
+}
+
+// Turns the device's last error of this thread into an exception.
+void check_device(RTCDevice device, const CancelFlag& cancel) {
+    const RTCError error = rtcGetDeviceError(device);
+    throw_if_cancelled(cancel);
+    switch (error) {
+        case RTC_ERROR_NONE:
+            return;
+        case RTC_ERROR_OUT_OF_MEMORY:
+            throw std::bad_alloc();
+        case RTC_ERROR_CANCELLED:
+            throw Cancelled();
+        default:
+            throw std::runtime_error("Embree error " + std::to_string(error));
+    }
+}
+
+// No threads= here: it would set the task scheduler's limit for the whole process, host included.
+DevicePtr make_device() {
+    DevicePtr device(rtcNewDevice(nullptr));
+    if (device == nullptr) {
+        throw std::runtime_error("Embree cannot be started");
+    }
+    if (rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION) / 10000 != 3 ||
+        rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) {
+        throw std::runtime_error("Embree 3 with ray masks is needed");
+    }
+    return device;
+}
+
+ScenePtr make_scene(RTCDevice device, Monitor& monitor) {
+    ScenePtr scene(rtcNewScene(device));
+    if (scene == nullptr) {
+        check_device(device, *monitor.cancel);
+        throw std::bad_alloc();
+    }
+    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
+    rtcSetSceneProgressMonitorFunction(scene.get(), on_progress, &monitor);
+    return scene;
+}
+
+// Copies a mesh into buffers of Embree's own, transformed unless `to_world` is null.
+GeometryPtr make_triangles(RTCDevice device,
+                           const Mesh& mesh,
+                           const Mat4* to_world,
+                           const CancelFlag& cancel) {
+    GeometryPtr geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(),
+                                                                 RTC_BUFFER_TYPE_VERTEX,
+                                                                 0,
+                                                                 RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float),
+                                                                 mesh.positions.size()));
+    auto* triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry.get(),
+                                                                          RTC_BUFFER_TYPE_INDEX,
+                                                                          0,
+                                                                          RTC_FORMAT_UINT3,
+                                                                          3 * sizeof(std::uint32_t),
+                                                                          mesh.triangles.size()));
+    check_device(device, cancel);
+    CHECK(vertices != nullptr && triangles != nullptr);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
+        const Vec3 p = to_world ? transform_point(*to_world, mesh.positions[i]) : mesh.positions[i];
+        vertices[3 * i] = p.x;
+        vertices[3 * i + 1] = p.y;
+        vertices[3 * i + 2] = p.z;
+    }
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
+        const UVec3& t = mesh.triangles[i];
+        triangles[3 * i] = t.x;
+        triangles[3 * i + 1] = t.y;
+        triangles[3 * i + 2] = t.z;
+    }
+    return geometry;
+}
+
+GeometryPtr make_instance(RTCDevice device, RTCScene object, const Mat4& to_world) {
+    GeometryPtr geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(geometry.get(), object);
+    rtcSetGeometryTimeStepCount(geometry.get(), 1);
+    float columns[12];
+    for (int column = 0; column < 4; ++column) {
+        for (int row = 0; row < 3; ++row) {
+            columns[3 * column + row] = to_world[column][row];
+        }
+    }
+    rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+    return geometry;
+}
+
+// False for rays Embree must not see: x - x is 0 for finite x and NaN otherwise.
+bool traceable(const Ray& ray) {
+    const Vec3 zero = (ray.origin - ray.origin) + (ray.direction - ray.direction);
+    return zero.x + zero.y + zero.z + (ray.t_min - ray.t_min) == 0.0f && ray.t_max >= ray.t_min;
+}
+
+void fill(RTCRay& out, const Ray& ray, std::uint32_t mask) {
+    out.org_x = ray.origin.x;
+    out.org_y = ray.origin.y;
+    out.org_z = ray.origin.z;
+    out.tnear = ray.t_min;
+    out.dir_x = ray.direction.x;
+    out.dir_y = ray.direction.y;
+    out.dir_z = ray.direction.z;
+    out.time = 0.0f;
+    out.tfar = ray.t_max;
+    out.mask = mask;
+    out.id = 0;
+    out.flags = 0;
+}
+
+}  // namespace
+
+struct Accelerator::Impl {
+    Monitor monitor;
+    DevicePtr device;
+    std::vector<ScenePtr> objects;  // of meshes used more than once, by mesh index
+    ScenePtr scene;
+    Bounds3 bounds;
+
+    void build(std::span<const Mesh> meshes,
+               std::span<const Instance> instances,
+               const CancelFlag& cancel);
+    void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility);
+    void commit(RTCScene target, const CancelFlag& cancel);
+    RTCScene object_scene(const Mesh& mesh, std::uint32_t index, const CancelFlag& cancel);
+};
+
+void Accelerator::Impl::commit(RTCScene target, const CancelFlag& cancel) {
+    rtcCommitScene(target);
+    check_device(device.get(), cancel);
+}
+
+// The scene of a shared mesh, built when it is first met.
+RTCScene Accelerator::Impl::object_scene(const Mesh& mesh,
+                                         std::uint32_t index,
+                                         const CancelFlag& cancel) {
+    ScenePtr& object = objects[index];
+    if (object == nullptr) {
+        ScenePtr built = make_scene(device.get(), monitor);
+        const GeometryPtr geometry = make_triangles(device.get(), mesh, nullptr, cancel);
+        rtcSetGeometryMask(geometry.get(), 0xffffffffu);
+        rtcCommitGeometry(geometry.get());
+        rtcAttachGeometryByID(built.get(), geometry.get(), 0);
+        commit(built.get(), cancel);
+        object = std::move(built);
+    }
+    return object.get();
+}
+
+// The geometry's id in the scene is the index of its instance.
+void Accelerator::Impl::attach(std::uint32_t index,
+                               const GeometryPtr& geometry,
+                               std::uint32_t visibility) {
+    rtcSetGeometryMask(geometry.get(), visibility);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(scene.get(), geometry.get(), index);
+}
+
+void Accelerator::Impl::build(std::span<const Mesh> meshes,
+                              std::span<const Instance> instances,
+                              const CancelFlag& cancel) {
+    std::vector<std::uint32_t> uses(meshes.size(), 0);
+    for (const Instance& instance : instances) {
+        if (instance.mesh >= meshes.size()) {
+            throw std::invalid_argument("Accelerator: an instance refers to no mesh");
+        }
+        ++uses[instance.mesh];
+    }
+    monitor.cancel = &cancel;
+    device = make_device();
+    rtcSetDeviceMemoryMonitorFunction(device.get(), on_memory, &monitor);
+    objects.resize(meshes.size());
+    scene = make_scene(device.get(), monitor);
+    for (std::uint32_t i = 0; i < instances.size(); ++i) {
+        const Instance& instance = instances[i];
+        const Mesh& mesh = meshes[instance.mesh];
+        throw_if_cancelled(cancel);
+        if (mesh.triangles.empty() || mesh.positions.empty()) {
+            continue;
+        }
+        if (uses[instance.mesh] == 1) {
+            attach(i,
+                   make_triangles(device.get(), mesh, &instance.to_world, cancel),
+                   instance.visibility);
+        } else {
+            RTCScene object = object_scene(mesh, instance.mesh, cancel);
+            attach(i, make_instance(device.get(), object, instance.to_world), instance.visibility);
+        }
+    }
+    check_device(device.get(), cancel);
+    commit(scene.get(), cancel);
+
+    RTCBounds b;
+    rtcGetSceneBounds(scene.get(), &b);
+    bounds.lower = Vec3(b.lower_x, b.lower_y, b.lower_z);
+    bounds.upper = Vec3(b.upper_x, b.upper_y, b.upper_z);
+    monitor.cancel = nullptr;
+}
+
+Accelerator::Accelerator(std::span<const Mesh> meshes,
+                         std::span<const Instance> instances,
+                         const CancelFlag& cancel)
+    : impl_(std::make_unique<Impl>()) {
+    const FloatStateGuard float_state;
+    impl_->build(meshes, instances, cancel);
+}
+
+Accelerator::~Accelerator() = default;
+
+void Accelerator::intersect(std::span<const Ray> rays,
+                            std::span<const std::uint32_t> visibility,
+                            std::span<Hit> hits) const {
+    DCHECK(visibility.size() >= rays.size() && hits.size() >= rays.size());
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCScene scene = impl_->scene.get();
+    RTCRayHit query;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        hits[i] = Hit{};
+        if (!traceable(rays[i])) {
+            continue;
+        }
+        fill(query.ray, rays[i], visibility[i]);
+        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(scene, &context, &query);
+        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+            continue;
+        }
+        const bool shared = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+        hits[i] = {query.ray.tfar,
+                   query.hit.u,
+                   query.hit.v,
+                   shared ? query.hit.instID[0] : query.hit.geomID,
+                   query.hit.primID};
+    }
+}
+
+void Accelerator::occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
+    DCHECK(occluded.size() >= rays.size());
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCScene scene = impl_->scene.get();
+    RTCRay query;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        occluded[i] = 0;
+        if (!traceable(rays[i])) {
+            continue;
+        }
+        fill(query, rays[i], kVisibleShadow);
+        rtcOccluded1(scene, &context, &query);
+        occluded[i] = query.tfar < 0.0f ? 1 : 0;  // Embree marks occlusion by tfar = -inf
+    }
+}
+
+Bounds3 Accelerator::bounds() const {
+    return impl_->bounds;
+}
+
+std::uint64_t Accelerator::bytes() const {
+    const std::int64_t bytes = impl_->monitor.bytes.load(std::memory_order_relaxed);
+    return bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
+}
+
+bool accelerator_self_test() {
+    try {
+        Mesh mesh;
+        mesh.name = "self test";
+        mesh.positions.assign(3, Vec3(0));
+        mesh.positions[1].x = 1.0f;
+        mesh.positions[2].y = 1.0f;
+        mesh.triangles.emplace_back(0, 1, 2);
+        Instance instance;
+        instance.materials = {0};
+        const Accelerator accelerator(std::span(&mesh, 1), std::span(&instance, 1), CancelFlag());
+        const Ray ray{Vec3(0.25f, 0.5f, 2.0f), Vec3(0, 0, -1)};
+        const std::uint32_t visibility = kVisibleAll;
+        Hit hit;
+        accelerator.intersect(std::span(&ray, 1), std::span(&visibility, 1), std::span(&hit, 1));
+        return hit.instance == 0 && hit.triangle == 0 && std::abs(hit.t - 2.0f) < 1e-5f &&
+               std::abs(hit.u - 0.25f) < 1e-5f && std::abs(hit.v - 0.5f) < 1e-5f;
+    } catch (const std::exception&) {
+        return false;
+    }
+}
+
+}  // namespace pharos
