@@ -1,12 +1,14 @@
 // The world as a light: a luminance map over directions sampled in proportion, and its density.
 //
-// u = 0.5 - atan2(d.y, d.x) / 2 pi, v = 1 - acos(d.z) / pi (v up, z up; cycles-parity 2.1). The map
-// holds average |rgb| * sin(theta); the radiance itself is given by a table of the evaluated world
-// program (constant: one texel) looked up by the caller.
+// u = 0.5 - atan2(d.y, d.x) / 2 pi, v = 1 - acos(d.z) / pi (v up, z up). The map holds average
+// |rgb| times the texel's solid angle; within a texel directions are uniform in solid angle, so the
+// density is constant there and bounded at the poles. Radiance itself comes from the world's
+// program.
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/math.h"
 #include "sampling/distribution_2d.h"
@@ -26,10 +28,13 @@ class EnvironmentLight {
 
     [[nodiscard]] Sample sample(const Vec2& u) const;
     [[nodiscard]] float pdf(const Vec3& wi) const;
+
     [[nodiscard]] Rgb mean_radiance() const { return mean_; }  // over the sphere, for light choice
 
   private:
     Distribution2D map_;
+    std::vector<float> row_cosine_;   // z at the rows' edges, -1 ... 1
+    std::vector<float> row_density_;  // 1 / solid angle of a row's texels
     Rgb mean_{0.0f};
     bool constant_ = true;
 };
