@@ -20,7 +20,8 @@ namespace pharos {
 // What a scene does not need is decided once, here.
 struct SceneNeeds {
     bool lamps_hittable = false;
-    bool emissive_triangles = false;
+    bool emission = false;            // some surface emits
+    bool emissive_triangles = false;  // and is sampled by next-event estimation
     bool environment = false;         // the world is not black
     bool constant_environment = false;
     bool transparency = false;        // some material lets shadow rays through

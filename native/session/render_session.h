@@ -49,10 +49,20 @@ struct SessionStatistics {
     double render_cpu_seconds = 0.0;  // process CPU time of passes and training
 };
 
+// The picture after some number of samples, kept for whoever measures error over time.
+struct SessionSnapshot {
+    std::uint32_t samples = 0;
+    double cpu_seconds = 0.0;     // of passes and training up to here
+    std::vector<float> combined;  // RGBA
+};
+
 class RenderSession {
   public:
     // Takes the description; work begins at once on threads of the session. threads 0: one per core.
-    explicit RenderSession(SceneDescription description, unsigned threads = 0);
+    // A snapshot is kept at the end of the first pass that reaches each of `snapshot_samples`.
+    explicit RenderSession(SceneDescription description,
+                           unsigned threads = 0,
+                           std::vector<std::uint32_t> snapshot_samples = {});
     ~RenderSession();
     RenderSession(const RenderSession&) = delete;
     RenderSession& operator=(const RenderSession&) = delete;
@@ -65,6 +75,7 @@ class RenderSession {
     [[nodiscard]] SessionProgress progress() const;
     [[nodiscard]] SessionStatistics statistics() const;
     [[nodiscard]] std::vector<ReportEntry> report() const;
+    [[nodiscard]] std::vector<SessionSnapshot> snapshots() const;
 
     [[nodiscard]] std::uint32_t width() const;  // of the rendered window
     [[nodiscard]] std::uint32_t height() const;

@@ -1,0 +1,50 @@
+// pharos-cli: renders dump files without Blender, bit-equal to what Blender shows.
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "cli/commands.h"
+
+namespace {
+
+constexpr const char* kUsage =
+    "usage: pharos-cli render FILE -o OUT.exr [options]\n"
+    "  --samples N        samples per pixel (default: the file's)\n"
+    "  --seed N           seed (default: the file's)\n"
+    "  --threads N        threads (default: one per core)\n"
+    "  --guiding MODE     off, neural or slides (default: the file's)\n"
+    "  --nee on|off       next-event estimation (default: the file's)\n"
+    "  --time-limit S     stop after S seconds\n"
+    "  --snapshots A,B    also write OUT.A.exr, OUT.B.exr after that many samples\n"
+    "  --stats            print work and time per stage\n"
+    "  --stats-json FILE  write the same, with the snapshots' CPU seconds, as JSON\n"
+    "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write OUT)\n";
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const std::vector<std::string> arguments(argv + 1, argv + argc);
+    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
+        std::fputs("pharos-cli: this processor lacks AVX2 and FMA\n", stderr);
+        return 1;
+    }
+    if (arguments.empty() || arguments[0] == "--help" || arguments[0] == "-h") {
+        std::fputs(kUsage, arguments.empty() ? stderr : stdout);
+        return arguments.empty() ? 2 : 0;
+    }
+    try {
+        if (arguments[0] == "render") {
+            return pharos::cli::render({arguments.begin() + 1, arguments.end()});
+        }
+        std::fprintf(stderr, "pharos-cli: unknown command '%s'\n%s", arguments[0].c_str(), kUsage);
+        return 2;
+    } catch (const pharos::cli::UsageError& error) {
+        std::fprintf(stderr, "pharos-cli: %s\n%s", error.what(), kUsage);
+        return 2;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "pharos-cli: %s\n", error.what());
+        return 1;
+    }
+}

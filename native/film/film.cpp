@@ -1,0 +1,126 @@
+#include "film/film.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+
+namespace pharos {
+
+namespace {
+
+constexpr float kBackgroundDepth = 1e10f;
+constexpr std::size_t kAux = 9;  // normal, guide normal, albedo
+
+}  // namespace
+
+int film_pass_channels(FilmPass pass) {
+    switch (pass) {
+        case FilmPass::Combined:
+            return 4;
+        case FilmPass::Depth:
+        case FilmPass::SampleCount:
+            return 1;
+        default:
+            return 3;
+    }
+}
+
+Film::Film(const FilmDescription& description)
+    : width_(description.crop_width), height_(description.crop_height), exposure_(description.exposure) {
+    const std::size_t pixels = std::size_t{width_} * height_;
+    sum_.resize(pixels * 4);
+    half_sum_.resize(pixels * 3);
+    aux_.resize(pixels * kAux);
+    depth_.resize(pixels, kBackgroundDepth);
+    weight_.resize(pixels);
+    half_weight_.resize(pixels);
+    count_.resize(pixels);
+}
+
+void Film::add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even) {
+    DCHECK(is_finite(sample.radiance));
+    double* sum = &sum_[std::size_t{pixel} * 4];
+    double* half = &half_sum_[std::size_t{pixel} * 3];
+    double* aux = &aux_[std::size_t{pixel} * kAux];
+    for (int c = 0; c < 3; ++c) {
+        const double value = weight * static_cast<double>(sample.radiance[c]);
+        sum[c] += value;
+        half[c] += even ? value : 0.0;
+        aux[c] += weight * static_cast<double>(sample.normal[c]);
+        aux[3 + c] += weight * static_cast<double>(sample.guide_normal[c]);
+        aux[6 + c] += weight * static_cast<double>(sample.albedo[c]);
+    }
+    sum[3] += weight * static_cast<double>(sample.alpha);
+    if (count_[pixel] == 0) {
+        depth_[pixel] = sample.depth;  // as Cycles: of one sample, an average would lie between surfaces
+    }
+    weight_[pixel] += weight;
+    half_weight_[pixel] += even ? weight : 0.0;
+    ++count_[pixel];
+}
+
+void Film::read(FilmPass pass, std::span<float> out) const {
+    const std::size_t pixels = weight_.size();
+    const auto channels = static_cast<std::size_t>(film_pass_channels(pass));
+    CHECK_EQ(out.size(), pixels * channels);
+    if (pass == FilmPass::Depth) {
+        std::copy(depth_.begin(), depth_.end(), out.begin());
+        return;
+    }
+    const std::size_t aux_offset = pass == FilmPass::Normal ? 0 : pass == FilmPass::DenoisingNormal ? 3 : 6;
+    for (std::size_t i = 0; i < pixels; ++i) {
+        const double scale = weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
+        float* pixel = &out[i * channels];
+        if (pass == FilmPass::Combined) {
+            const double exposed = scale * static_cast<double>(exposure_);
+            for (std::size_t c = 0; c < 3; ++c) {
+                pixel[c] = static_cast<float>(sum_[i * 4 + c] * exposed);
+            }
+            pixel[3] = static_cast<float>(sum_[i * 4 + 3] * scale);
+        } else if (pass == FilmPass::SampleCount) {
+            pixel[0] = static_cast<float>(count_[i]);
+        } else {
+            for (std::size_t c = 0; c < 3; ++c) {
+                pixel[c] = static_cast<float>(aux_[i * kAux + aux_offset + c] * scale);
+            }
+        }
+    }
+}
+
+double Film::noise() const {
+    double difference = 0.0;
+    double total = 0.0;
+    for (std::size_t i = 0; i < weight_.size(); ++i) {
+        const double even = half_weight_[i];
+        const double odd = weight_[i] - even;
+        if (even <= 0.0 || odd <= 0.0) {
+            return 1.0;
+        }
+        // With halves of equal weight the whole's error is half of their difference.
+        double pixel_difference = 0.0;
+        double pixel_total = 0.0;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double half = half_sum_[i * 3 + c];
+            const double mean = sum_[i * 4 + c] / weight_[i];
+            const double d = 0.5 * (half / even - (sum_[i * 4 + c] - half) / odd);
+            pixel_difference += d * d;
+            pixel_total += mean * mean;
+        }
+        difference += pixel_difference / (pixel_total + 0.03);
+        total += 1.0;
+    }
+    return total > 0.0 ? std::sqrt(difference / total) : 1.0;
+}
+
+void Film::clear() {
+    std::ranges::fill(sum_, 0.0);
+    std::ranges::fill(half_sum_, 0.0);
+    std::ranges::fill(aux_, 0.0);
+    std::ranges::fill(depth_, kBackgroundDepth);
+    std::ranges::fill(weight_, 0.0);
+    std::ranges::fill(half_weight_, 0.0);
+    std::ranges::fill(count_, 0u);
+}
+
+}  // namespace pharos

@@ -1,0 +1,120 @@
+#include "integrator/integrator.h"
+
+#include <chrono>
+
+#include "integrator/path_batch.h"
+#include "integrator/stages.h"
+
+namespace pharos {
+
+namespace {
+
+// Large enough for full SIMD groups deep in the path, small enough for a core's L2.
+constexpr std::uint32_t kBatchPaths = 1024;
+
+[[nodiscard]] std::uint64_t nanoseconds() {
+    return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                          std::chrono::steady_clock::now().time_since_epoch())
+                                          .count());
+}
+
+// Runs a stage and books its items and time.
+template <class Function>
+void timed(BatchStatistics& statistics, Stage stage, const Function& function) {
+    const std::uint64_t begin = nanoseconds();
+    StageCounter& counter = statistics[stage];
+    counter.items += function();
+    counter.nanoseconds += nanoseconds() - begin;
+}
+
+}  // namespace
+
+void BatchStatistics::add(const BatchStatistics& other) {
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+        stages[i].items += other.stages[i].items;
+        stages[i].nanoseconds += other.stages[i].nanoseconds;
+    }
+    camera_samples += other.camera_samples;
+    vertices += other.vertices;
+    rays += other.rays;
+    nonfinite += other.nonfinite;
+}
+
+struct Integrator::Worker {
+    PathBatch batch{kBatchPaths};
+    BatchStatistics statistics;
+};
+
+Integrator::Integrator(const Scene& scene, ThreadPool& pool)
+    : scene_(scene),
+      pool_(pool),
+      camera_(scene.description.camera, scene.description.film.width, scene.description.film.height),
+      filter_(scene.description.film.filter, scene.description.film.filter_width) {
+    for (unsigned worker = 0; worker < pool.size(); ++worker) {
+        workers_.push_back(std::make_unique<Worker>());
+    }
+}
+
+Integrator::~Integrator() = default;
+
+std::uint32_t Integrator::batches_per_sample() const {
+    const FilmDescription& film = scene_.description.film;
+    return (film.crop_width * film.crop_height + kBatchPaths - 1) / kBatchPaths;
+}
+
+void Integrator::render_batch(const RenderContext& context, const BatchWork& work, Worker& worker) const {
+    PathBatch& batch = worker.batch;
+    BatchStatistics& statistics = worker.statistics;
+    timed(statistics, Stage::GenerateCameraRays, [&] { return generate_camera_rays(context, work, batch); });
+    statistics.camera_samples += work.pixels;
+    while (!batch.active.empty()) {
+        statistics.rays += batch.active.size();
+        timed(statistics, Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
+        timed(statistics, Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
+        timed(statistics, Stage::AddEscapedRadiance, [&] { return add_escaped_radiance(context, batch); });
+        timed(statistics, Stage::EvaluateMaterials, [&] { return evaluate_materials(context, batch); });
+        statistics.vertices += batch.surfaces.size();
+        timed(statistics, Stage::AddEmittedRadiance, [&] { return add_emitted_radiance(context, batch); });
+        timed(statistics, Stage::SampleDirectLight, [&] { return sample_direct_light(context, batch); });
+        statistics.rays += batch.shadow_rays.size();
+        timed(statistics, Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
+        timed(statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
+    }
+    statistics.nonfinite += finish_paths(batch);
+}
+
+bool Integrator::render_pass(const PassSettings& pass, SharedFilm& film, const StopCondition& stop) {
+    const RenderContext context{scene_, camera_, filter_, pass};
+    const std::uint32_t pixels = film.film.width() * film.film.height();
+    std::atomic<bool> complete{true};
+    // A batch is a run of pixels with all of the pass' samples, one after the other.
+    pool_.parallel_for(batches_per_sample(), [&](std::size_t index, unsigned thread) {
+        Worker& worker = *workers_[thread];
+        const auto first = static_cast<std::uint32_t>(index) * kBatchPaths;
+        const std::uint32_t count = std::min(kBatchPaths, pixels - first);
+        for (std::uint32_t i = 0; i < pass.samples; ++i) {
+            if (stop.reached()) {
+                complete.store(false, std::memory_order_relaxed);
+                return;
+            }
+            const std::uint32_t sample = pass.first_sample + i;
+            render_batch(context, {first, count, sample}, worker);
+            timed(worker.statistics, Stage::AccumulateFilm, [&] {
+                const std::shared_lock lock(film.mutex);
+                for (std::uint32_t root = 0; root < count; ++root) {
+                    film.film.add(
+                        first + root, worker.batch.root_sample[root], pass.weight, sample % 2 == 0);
+                }
+                return count;
+            });
+            film.serial.fetch_add(1, std::memory_order_relaxed);
+        }
+    });
+    total_ = {};
+    for (const auto& worker : workers_) {
+        total_.add(worker->statistics);
+    }
+    return complete.load();
+}
+
+}  // namespace pharos

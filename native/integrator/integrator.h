@@ -1,0 +1,69 @@
+// The path tracer: renders passes of a scene into a film on a pool of threads.
+//
+// Estimator: unidirectional path tracing with next-event estimation and scattering joined by multiple
+// importance sampling (Veach 1997, power heuristic); wavefront stages over batches that fit a core's
+// cache (Laine et al. 2013 give the reason, stages.h the order). The picture depends on the scene and
+// the pass numbers alone, not on the number of threads.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <vector>
+
+#include "core/cancel.h"
+#include "core/parallel.h"
+#include "film/film.h"
+#include "integrator/render_context.h"
+
+namespace pharos {
+
+// A film that a host may read while batches are added: adding takes the lock shared (batches own
+// their pixels), reading takes it alone.
+struct SharedFilm {
+    explicit SharedFilm(const FilmDescription& description) : film(description) {}
+
+    Film film;
+    mutable std::shared_mutex mutex;
+    std::atomic<std::uint64_t> serial{0};  // batches added
+};
+
+// When a pass has to end early: on cancel, or at a deadline (time limits; never adaptive).
+struct StopCondition {
+    const CancelFlag& cancel;
+    std::optional<std::chrono::steady_clock::time_point> deadline;
+
+    [[nodiscard]] bool reached() const {
+        return cancel.cancelled() || (deadline && std::chrono::steady_clock::now() >= *deadline);
+    }
+};
+
+class Integrator {
+  public:
+    Integrator(const Scene& scene, ThreadPool& pool);
+    ~Integrator();
+
+    // Renders a pass; false when it was stopped before its end (finished batches are in the film).
+    bool render_pass(const PassSettings& pass, SharedFilm& film, const StopCondition& stop);
+
+    [[nodiscard]] std::uint32_t batches_per_sample() const;
+    [[nodiscard]] const BatchStatistics& statistics() const { return total_; }
+
+  private:
+    struct Worker;
+
+    void render_batch(const RenderContext& context, const struct BatchWork& work, Worker& worker) const;
+
+    const Scene& scene_;
+    ThreadPool& pool_;
+    Camera camera_;
+    FilterSampler filter_;
+    std::vector<std::unique_ptr<Worker>> workers_;
+    BatchStatistics total_;
+};
+
+}  // namespace pharos

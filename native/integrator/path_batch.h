@@ -1,0 +1,106 @@
+// The state of one thread's batch of paths: structure of arrays, reused from batch to batch.
+//
+// A *root* is one camera sample (pixel and sample index); a *path* is one of possibly several
+// continuations of it (splitting). Paths in flight are listed in `active`, in a fixed order; the arrays
+// under "rays" run parallel to `active`, those under "surfaces" parallel to the hits among them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/math.h"
+#include "film/film.h"
+#include "geometry/accelerator.h"
+#include "geometry/surface_interaction.h"
+#include "lights/light.h"
+#include "materials/material.h"
+
+namespace pharos {
+
+// Bounce counters by Cycles' meaning (cycles-parity 2.4) and what the last scattering was.
+struct PathCounters {
+    std::uint16_t depth = 0;        // vertices so far, transparent ones included: sampler dimensions
+    std::uint16_t bounce = 0;       // scatterings, transparent ones excluded
+    std::uint16_t diffuse = 0;
+    std::uint16_t glossy = 0;
+    std::uint16_t transmission = 0;
+    std::uint16_t transparent = 0;
+    bool terminate_at_surface = false;  // a limit was reached: emission of the next surface, then the end
+    bool from_camera = true;            // nothing but transparent surfaces since the camera
+    bool after_diffuse = false;         // some scattering so far was diffuse (caustics switches)
+    bool features_done = false;         // albedo and normal for denoising are taken
+};
+
+// A shadow ray waiting for its answer.
+struct ShadowRay {
+    Rgb contribution{0.0f};
+    std::uint32_t path = 0;
+};
+
+// Light samples whose radiance a node program gives.
+struct PendingLight {
+    SurfaceInteraction emitter;   // emissive triangle
+    Vec3 direction;               // world
+    std::uint32_t shadow = 0;     // into shadow_rays
+};
+
+struct PathBatch {
+    explicit PathBatch(std::uint32_t capacity);
+
+    std::uint32_t capacity;
+    std::uint32_t roots = 0;  // in use
+    std::uint32_t paths = 0;  // in use; the first `roots` paths are the roots' own
+
+    // --- roots ---
+    std::vector<std::uint32_t> root_pixel;  // in the rendered window
+    std::vector<FilmSample> root_sample;
+
+    // --- paths ---
+    std::vector<std::uint32_t> root;
+    std::vector<std::uint32_t> sampler_hash;
+    std::vector<std::uint32_t> sample_index;
+    std::vector<Rgb> beta;
+    std::vector<Rgb> radiance;
+    std::vector<Rgb> albedo_product;        // for roulette
+    std::vector<float> scatter_pdf;         // solid angle, of the last scattering; 0: camera or delta
+    std::vector<LightSampleContext> origin; // of the last scattering, for MIS of chance hits
+    std::vector<PathCounters> counters;
+    std::vector<std::uint32_t> path_visibility;  // bit of the last scattering that was not transparent
+
+    // --- rays, parallel to active ---
+    std::vector<std::uint32_t> active;
+    std::vector<Ray> rays;
+    std::vector<std::uint32_t> visibility;
+    std::vector<Hit> hits;
+    std::vector<std::uint32_t> next_active;
+    std::vector<Ray> next_rays;
+    std::vector<std::uint32_t> next_visibility;
+
+    // --- surfaces ---
+    std::vector<std::uint32_t> surface_path;
+    std::vector<SurfaceInteraction> surfaces;
+    std::vector<std::uint32_t> material_order;  // indices into surfaces, grouped by material
+    std::vector<std::uint32_t> material_count;
+    ClosureBatch closures;
+    std::vector<Bsdf> bsdfs;
+    std::vector<BsdfTraits> traits;
+
+    // --- rays that left the scene ---
+    std::vector<std::uint32_t> escaped;  // indices into active
+    std::vector<Vec3> escaped_directions;
+    std::vector<Rgb> escaped_radiance;
+
+    // --- shadow rays ---
+    std::vector<ShadowRay> shadow_rays;
+    std::vector<Ray> shadow_queries;  // parallel to shadow_rays
+    std::vector<std::uint8_t> occluded;
+    std::vector<PendingLight> pending_triangles;
+    std::vector<PendingLight> pending_worlds;
+    std::vector<SurfaceInteraction> pending_surfaces;
+    std::vector<Vec3> pending_directions;
+    std::vector<Rgb> pending_radiance;
+
+    ShadingScratch scratch;
+};
+
+}  // namespace pharos

@@ -1,0 +1,78 @@
+// What every stage may look at: the scene and this pass, all const.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "camera/camera.h"
+#include "film/filter.h"
+#include "scene/scene.h"
+
+namespace pharos {
+
+// One pass: `samples` consecutive samples of every pixel, all with one film weight.
+struct PassSettings {
+    std::uint32_t first_sample = 0;
+    std::uint32_t samples = 1;
+    double weight = 1.0;
+};
+
+struct RenderContext {
+    const Scene& scene;
+    const Camera& camera;
+    const FilterSampler& filter;
+    PassSettings pass;
+
+    [[nodiscard]] const RenderSettings& settings() const { return scene.description.settings; }
+};
+
+// The stages in the order the light travels; each counts its items and time.
+enum class Stage : std::uint8_t {
+    GenerateCameraRays,
+    IntersectClosest,
+    AddLampRadiance,
+    AddEscapedRadiance,
+    EvaluateMaterials,
+    AddEmittedRadiance,
+    QueryGuidingField,
+    SampleDirectLight,
+    TraceShadowRays,
+    SampleScattering,
+    AccumulateFilm,
+    Train,
+    Count
+};
+
+inline constexpr std::array<std::string_view, static_cast<std::size_t>(Stage::Count)> kStageNames{
+    "generate_camera_rays",
+    "intersect_closest",
+    "add_lamp_radiance",
+    "add_escaped_radiance",
+    "evaluate_materials",
+    "add_emitted_radiance",
+    "query_guiding_field",
+    "sample_direct_light",
+    "trace_shadow_rays",
+    "sample_scattering",
+    "accumulate_film",
+    "train"};
+
+struct StageCounter {
+    std::uint64_t items = 0;
+    std::uint64_t nanoseconds = 0;
+};
+
+struct BatchStatistics {
+    std::array<StageCounter, static_cast<std::size_t>(Stage::Count)> stages{};
+    std::uint64_t camera_samples = 0;
+    std::uint64_t vertices = 0;
+    std::uint64_t rays = 0;
+    std::uint64_t nonfinite = 0;
+
+    [[nodiscard]] StageCounter& operator[](Stage stage) { return stages[static_cast<std::size_t>(stage)]; }
+
+    void add(const BatchStatistics& other);
+};
+
+}  // namespace pharos

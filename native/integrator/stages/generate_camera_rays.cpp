@@ -1,0 +1,40 @@
+#include "integrator/stages.h"
+#include "sampling/sampler.h"
+
+namespace pharos {
+
+std::uint64_t generate_camera_rays(const RenderContext& context, const BatchWork& work, PathBatch& batch) {
+    const FilmDescription& film = context.scene.description.film;
+    batch.roots = work.pixels;
+    batch.paths = work.pixels;
+    batch.active.clear();
+    batch.rays.clear();
+    batch.visibility.clear();
+    for (std::uint32_t path = 0; path < work.pixels; ++path) {
+        const std::uint32_t pixel = work.first_pixel + path;
+        const std::uint32_t x = film.crop_x + pixel % film.crop_width;
+        const std::uint32_t y = film.crop_y + pixel / film.crop_width;
+        const std::uint32_t hash = pixel_hash(context.settings().seed, x, y);
+        const Vec4 u = sobol_4d(hash, work.sample, 0);
+        const Vec2 offset = context.filter.sample(Vec2(u.x, u.y));
+        const Vec2 raster(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+
+        batch.root_pixel[path] = pixel;
+        batch.root_sample[path] = FilmSample{};
+        batch.root[path] = path;
+        batch.sampler_hash[path] = hash;
+        batch.sample_index[path] = work.sample;
+        batch.beta[path] = Rgb(1.0f);
+        batch.radiance[path] = Rgb(0.0f);
+        batch.albedo_product[path] = Rgb(1.0f);
+        batch.scatter_pdf[path] = 0.0f;
+        batch.counters[path] = PathCounters{};
+        batch.path_visibility[path] = kVisibleCamera;
+        batch.active.push_back(path);
+        batch.rays.push_back(context.camera.generate_ray(raster, Vec2(u.z, u.w)));
+        batch.visibility.push_back(kVisibleCamera);
+    }
+    return work.pixels;
+}
+
+}  // namespace pharos

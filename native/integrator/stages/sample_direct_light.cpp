@@ -1,0 +1,142 @@
+#include "geometry/ray_offset.h"
+#include "integrator/mis.h"
+#include "integrator/stages.h"
+#include "sampling/sampler.h"
+
+namespace pharos {
+
+namespace {
+
+// Shadow rays end just before the light, so that an emissive surface does not shade itself.
+constexpr float kShadowEnd = 1.0f - 1e-4f;
+
+SurfaceInteraction point_on_emitter(const Scene& scene, const LightSamplerSample& light, const Ray& ray) {
+    Hit hit;
+    hit.t = light.sample.distance;
+    hit.u = light.u;
+    hit.v = light.v;
+    hit.instance = light.instance;
+    hit.triangle = light.triangle;
+    return scene.interaction(ray, hit);
+}
+
+struct Receiver {
+    std::size_t surface = 0;
+    std::uint32_t path = 0;
+};
+
+// Samples one light for a vertex; queues a shadow ray when something may arrive.
+void sample_light(const RenderContext& context, const Receiver& receiver, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    const SurfaceInteraction& surface = batch.surfaces[receiver.surface];
+    const Bsdf& bsdf = batch.bsdfs[receiver.surface];
+    const PathCounters& counters = batch.counters[receiver.path];
+    const std::uint32_t set = 1u + 2u * counters.depth;
+    const Vec4 u = sobol_4d(batch.sampler_hash[receiver.path], batch.sample_index[receiver.path], set);
+    const LightSampleContext receiving{
+        surface.p, surface.ns, batch.traits[receiver.surface].transmission_probability > 0.0f};
+
+    const auto light = scene.lights->sample(receiving, u.x, Vec2(u.y, u.z));
+    if (!light || counters.bounce > light->sample.max_bounces) {
+        return;
+    }
+    const LightSample& sample = light->sample;
+    const BsdfEval scattering = eval_bsdf(bsdf, sample.wi);
+    if (is_zero(scattering.f_cos)) {
+        return;
+    }
+    const float weight = sample.delta ? 1.0f : power_heuristic(sample.pdf, scattering.pdf);
+    const Rgb factor = batch.beta[receiver.path] * scattering.f_cos * (weight / sample.pdf);
+
+    Ray ray;
+    ray.origin = offset_ray_origin(surface.p, surface.ng, surface.p_error, sample.wi);
+    ray.direction = sample.wi;
+    ray.t_max = std::isfinite(sample.distance) ? sample.distance * kShadowEnd : kInfinity;
+
+    const auto shadow = static_cast<std::uint32_t>(batch.shadow_rays.size());
+    Rgb L = sample.L;
+    if (light->environment) {
+        if (scene.needs.constant_environment) {
+            L = scene.constant_world;
+        } else {
+            L = Rgb(1.0f);
+            batch.pending_worlds.push_back({{}, sample.wi, shadow});
+        }
+    } else if (light->instance != kNone) {
+        L = Rgb(1.0f);
+        batch.pending_triangles.push_back({point_on_emitter(scene, *light, ray), sample.wi, shadow});
+    }
+    batch.shadow_rays.push_back({factor * L, receiver.path});
+    if (!sample.cast_shadow) {
+        ray.t_max = 0.0f;  // an empty interval is never occluded
+    }
+    batch.shadow_queries.push_back(ray);
+}
+
+// Radiance of the sampled emissive triangles, by material.
+void evaluate_pending_triangles(const RenderContext& context, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    auto& pending = batch.pending_triangles;
+    std::ranges::stable_sort(pending, {}, [](const PendingLight& p) { return p.emitter.material; });
+    for (std::size_t begin = 0; begin < pending.size();) {
+        const std::uint32_t material = pending[begin].emitter.material;
+        std::size_t end = begin;
+        batch.pending_surfaces.clear();
+        for (; end < pending.size() && pending[end].emitter.material == material; ++end) {
+            batch.pending_surfaces.push_back(pending[end].emitter);
+        }
+        batch.pending_radiance.resize(end - begin);
+        evaluate_emission(scene.materials[material],
+                          scene.shading,
+                          batch.pending_surfaces,
+                          batch.scratch,
+                          batch.pending_radiance);
+        for (std::size_t i = begin; i < end; ++i) {
+            batch.shadow_rays[pending[i].shadow].contribution *= batch.pending_radiance[i - begin];
+        }
+        begin = end;
+    }
+}
+
+void evaluate_pending_worlds(const RenderContext& context, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    batch.pending_directions.clear();
+    for (const PendingLight& pending : batch.pending_worlds) {
+        batch.pending_directions.push_back(pending.direction);
+    }
+    batch.pending_radiance.resize(batch.pending_directions.size());
+    evaluate_world(scene.world, scene.shading, batch.pending_directions, batch.scratch, batch.pending_radiance);
+    for (std::size_t i = 0; i < batch.pending_worlds.size(); ++i) {
+        batch.shadow_rays[batch.pending_worlds[i].shadow].contribution *= batch.pending_radiance[i];
+    }
+}
+
+}  // namespace
+
+std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch) {
+    batch.shadow_rays.clear();
+    batch.shadow_queries.clear();
+    if (!context.scene.needs.nee || !context.settings().use_nee) {
+        return 0;
+    }
+    batch.pending_triangles.clear();
+    batch.pending_worlds.clear();
+    std::uint64_t items = 0;
+    for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
+        const std::uint32_t path = batch.surface_path[s];
+        const bool smooth = batch.bsdfs[s].total_sample_weight > 0.0f && batch.traits[s].delta_probability < 1.0f;
+        if (smooth && !batch.counters[path].terminate_at_surface) {
+            sample_light(context, {s, path}, batch);
+            ++items;
+        }
+    }
+    if (!batch.pending_triangles.empty()) {
+        evaluate_pending_triangles(context, batch);
+    }
+    if (!batch.pending_worlds.empty()) {
+        evaluate_pending_worlds(context, batch);
+    }
+    return items;
+}
+
+}  // namespace pharos
