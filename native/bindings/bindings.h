@@ -1,0 +1,33 @@
+// The Python module `_native`, part by part. Nothing but conversions lives here.
+//
+// Every entry point restores the host's floating-point state; what takes over a millisecond runs
+// without the GIL. Classes are local to this module: other extensions in the process may use
+// pybind11 too.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include "core/fp_state.h"
+
+namespace pharos {
+
+using FloatGuard = pybind11::call_guard<FloatStateGuard>;
+using FreeGuard = pybind11::call_guard<FloatStateGuard, pybind11::gil_scoped_release>;
+
+// Assigns keyword arguments to the attributes of the same names; unknown names raise
+// AttributeError.
+template <class T>
+void assign_fields(T& target, const pybind11::kwargs& fields) {
+    const pybind11::object view = pybind11::cast(&target, pybind11::return_value_policy::reference);
+    for (const auto& [name, value] : fields) {
+        pybind11::setattr(view, name, value);
+    }
+}
+
+void bind_enums(pybind11::module_& m);
+void bind_node_enums(pybind11::module_& m);
+void bind_programs(pybind11::module_& m);
+void bind_scene(pybind11::module_& m);
+void bind_session(pybind11::module_& m);
+
+}  // namespace pharos

@@ -1,0 +1,416 @@
+// Scene descriptions: one call per thing, arrays copied once; read back by tests and panels.
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "bindings/bindings.h"
+#include "bindings/casters.h"
+#include "scene/dump.h"
+#include "scene/scene_description.h"
+
+namespace py = pybind11;
+
+namespace pharos {
+namespace {
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+void require(bool condition, const std::string& name, const char* what) {
+    if (!condition) {
+        throw std::invalid_argument(name + ": " + what);
+    }
+}
+
+// Rows of `components` scalars as a vector of T, which has that layout. The GIL is not held
+// meanwhile: `array` keeps the memory alive.
+template <class T, class Scalar>
+std::vector<T> copy_rows(const Array<Scalar>& array, const std::string& name, const char* what) {
+    constexpr std::size_t components = sizeof(T) / sizeof(Scalar);
+    const auto size = static_cast<std::size_t>(array.size());
+    require(size % components == 0, name, what);
+    std::vector<T> out(size / components);
+    const Scalar* source = array.data();
+    const py::gil_scoped_release release;
+    if (size > 0) {
+        std::memcpy(static_cast<void*>(out.data()), source, size * sizeof(Scalar));
+    }
+    return out;
+}
+
+template <class Scalar, class T>
+py::array_t<Scalar> to_array(const std::vector<T>& rows) {
+    constexpr std::size_t components = sizeof(T) / sizeof(Scalar);
+    py::array_t<Scalar> out({rows.size(), components});
+    if (!rows.empty()) {
+        std::memcpy(out.mutable_data(), rows.data(), rows.size() * sizeof(T));
+    }
+    return out;
+}
+
+std::uint32_t index_of_last(std::size_t size) {
+    return static_cast<std::uint32_t>(size - 1);
+}
+
+using NamedUv = std::pair<std::string, Array<float>>;
+
+struct MeshArrays {
+    Array<float> positions;
+    Array<std::uint32_t> triangles;
+    NormalDomain normal_domain;
+    std::optional<Array<float>> normals;
+    std::optional<Array<std::uint16_t>> material_indices;
+    std::vector<NamedUv> uv_maps;
+};
+
+std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArrays& arrays) {
+    Mesh mesh;
+    mesh.positions = copy_rows<Vec3>(arrays.positions, name, "positions are not triples");
+    mesh.triangles = copy_rows<UVec3>(arrays.triangles, name, "triangles are not triples");
+    mesh.normal_domain = arrays.normal_domain;
+    if (arrays.normals) {
+        mesh.normals = copy_rows<Vec3>(*arrays.normals, name, "normals are not triples");
+    }
+    if (arrays.material_indices) {
+        mesh.material_indices = copy_rows<std::uint16_t>(
+            *arrays.material_indices, name, "material indices are not a list");
+    }
+    for (const auto& [uv_name, uv] : arrays.uv_maps) {
+        mesh.uv_maps.push_back({uv_name, copy_rows<Vec2>(uv, name, "uv are not pairs")});
+    }
+    const std::size_t normals = mesh.normal_domain == NormalDomain::Face ? 0
+                                : mesh.normal_domain == NormalDomain::Vertex
+                                    ? mesh.positions.size()
+                                    : 3 * mesh.triangles.size();
+    require(
+        mesh.normals.size() == normals, name, "the number of normals does not fit their domain");
+    require(mesh.material_indices.empty() || mesh.material_indices.size() == mesh.triangles.size(),
+            name,
+            "the number of material indices is not that of triangles");
+    for (const UvMap& map : mesh.uv_maps) {
+        require(map.uv.size() == 3 * mesh.triangles.size(),
+                name,
+                "a uv map does not have 3 per triangle");
+    }
+    mesh.name = std::move(name);
+    scene.meshes.push_back(std::move(mesh));
+    return index_of_last(scene.meshes.size());
+}
+
+struct InstanceArrays {
+    Array<float> matrices;  // n x 16, column-major as Blender stores them
+    Array<std::uint32_t> meshes;
+    Array<std::uint32_t> material_sets;
+    Array<std::uint32_t> visibility;
+};
+
+void add_instances(SceneDescription& scene,
+                   const std::vector<std::string>& names,
+                   const InstanceArrays& arrays) {
+    const std::size_t count = names.size();
+    const auto holds = [&](const auto& array, std::size_t each) {
+        return static_cast<std::size_t>(array.size()) == count * each;
+    };
+    require(holds(arrays.matrices, 16) && holds(arrays.meshes, 1) &&
+                holds(arrays.material_sets, 1) && holds(arrays.visibility, 1),
+            "add_instances",
+            "arrays of different lengths");
+    const float* matrices = arrays.matrices.data();
+    for (std::size_t i = 0; i < count; ++i) {
+        InstanceDescription instance;
+        instance.name = names[i];
+        instance.mesh = arrays.meshes.data()[i];
+        instance.material_set = arrays.material_sets.data()[i];
+        instance.visibility = arrays.visibility.data()[i];
+        std::memcpy(static_cast<void*>(&instance.to_world), matrices + 16 * i, 16 * sizeof(float));
+        scene.instances.push_back(std::move(instance));
+    }
+}
+
+struct ImageSource {
+    std::string path;
+    py::bytes data;
+    std::optional<Array<float>> pixels;  // height x width x 4, bottom row first
+};
+
+std::uint32_t add_image(SceneDescription& scene,
+                        ImageDescription image,
+                        const ImageSource& source) {
+    image.path = source.path;
+    const std::string_view bytes = source.data;
+    image.bytes.assign(bytes.begin(), bytes.end());
+    if (source.pixels) {
+        require(source.pixels->ndim() == 3 && source.pixels->shape(2) == 4,
+                image.name,
+                "pixels are not height x width x 4");
+        image.height = static_cast<std::uint32_t>(source.pixels->shape(0));
+        image.width = static_cast<std::uint32_t>(source.pixels->shape(1));
+        image.pixels = copy_rows<float>(*source.pixels, image.name, "pixels");
+    }
+    scene.images.push_back(std::move(image));
+    return index_of_last(scene.images.size());
+}
+
+py::dict mesh_as_dict(const SceneDescription& scene, std::size_t index) {
+    const Mesh& mesh = scene.meshes.at(index);
+    py::dict uv_maps;
+    for (const UvMap& map : mesh.uv_maps) {
+        uv_maps[py::str(map.name)] = to_array<float>(map.uv);
+    }
+    py::dict out;
+    out["name"] = mesh.name;
+    out["positions"] = to_array<float>(mesh.positions);
+    out["triangles"] = to_array<std::uint32_t>(mesh.triangles);
+    out["normal_domain"] = mesh.normal_domain;
+    out["normals"] = to_array<float>(mesh.normals);
+    out["material_indices"] = to_array<std::uint16_t>(mesh.material_indices);
+    out["uv_maps"] = uv_maps;
+    return out;
+}
+
+void bind_parts(py::module_& m) {
+    py::class_<InstanceDescription>(m, "InstanceDescription", py::module_local())
+        .def_readonly("name", &InstanceDescription::name)
+        .def_readonly("mesh", &InstanceDescription::mesh)
+        .def_readonly("material_set", &InstanceDescription::material_set)
+        .def_readonly("to_world", &InstanceDescription::to_world)
+        .def_readonly("visibility", &InstanceDescription::visibility);
+    py::class_<MaterialDescription>(m, "MaterialDescription", py::module_local())
+        .def_readonly("name", &MaterialDescription::name)
+        .def_readonly("program", &MaterialDescription::program)
+        .def_readonly("emission_sampling", &MaterialDescription::emission_sampling);
+    py::class_<ImageDescription>(m, "ImageDescription", py::module_local())
+        .def_readonly("name", &ImageDescription::name)
+        .def_readonly("path", &ImageDescription::path)
+        .def_property_readonly("byte_count",
+                               [](const ImageDescription& i) { return i.bytes.size(); })
+        .def_property_readonly("pixels",
+                               [](const ImageDescription& i) { return to_array<float>(i.pixels); })
+        .def_readonly("width", &ImageDescription::width)
+        .def_readonly("height", &ImageDescription::height)
+        .def_readonly("color_space", &ImageDescription::color_space)
+        .def_readonly("alpha", &ImageDescription::alpha);
+    py::class_<LightDescription>(m, "LightDescription", py::module_local())
+        .def_readwrite("name", &LightDescription::name)
+        .def_readwrite("type", &LightDescription::type)
+        .def_readwrite("to_world", &LightDescription::to_world)
+        .def_readwrite("strength", &LightDescription::strength)
+        .def_readwrite("radius", &LightDescription::radius)
+        .def_readwrite("spot_angle", &LightDescription::spot_angle)
+        .def_readwrite("spot_blend", &LightDescription::spot_blend)
+        .def_readwrite("shape", &LightDescription::shape)
+        .def_readwrite("size_u", &LightDescription::size_u)
+        .def_readwrite("size_v", &LightDescription::size_v)
+        .def_readwrite("spread", &LightDescription::spread)
+        .def_readwrite("angle", &LightDescription::angle)
+        .def_readwrite("soft_falloff", &LightDescription::soft_falloff)
+        .def_readwrite("normalize", &LightDescription::normalize)
+        .def_readwrite("cast_shadow", &LightDescription::cast_shadow)
+        .def_readwrite("use_mis", &LightDescription::use_mis)
+        .def_readwrite("visibility", &LightDescription::visibility)
+        .def_readwrite("max_bounces", &LightDescription::max_bounces);
+    py::class_<WorldDescription>(m, "WorldDescription", py::module_local())
+        .def_readwrite("program", &WorldDescription::program)
+        .def_readwrite("map_resolution", &WorldDescription::map_resolution)
+        .def_readwrite("use_mis", &WorldDescription::use_mis)
+        .def_readwrite("visibility", &WorldDescription::visibility);
+}
+
+void bind_views(py::module_& m) {
+    py::class_<CameraDescription>(m, "CameraDescription", py::module_local())
+        .def_readwrite("type", &CameraDescription::type)
+        .def_readwrite("to_world", &CameraDescription::to_world)
+        .def_readwrite("window_lower", &CameraDescription::window_lower)
+        .def_readwrite("window_upper", &CameraDescription::window_upper)
+        .def_readwrite("near_clip", &CameraDescription::near_clip)
+        .def_readwrite("far_clip", &CameraDescription::far_clip)
+        .def_readwrite("lens_radius", &CameraDescription::lens_radius)
+        .def_readwrite("focus_distance", &CameraDescription::focus_distance)
+        .def_readwrite("aperture_ratio", &CameraDescription::aperture_ratio)
+        .def_readwrite("aperture_blades", &CameraDescription::aperture_blades)
+        .def_readwrite("aperture_rotation", &CameraDescription::aperture_rotation);
+    py::class_<FilmDescription>(m, "FilmDescription", py::module_local())
+        .def_readwrite("width", &FilmDescription::width)
+        .def_readwrite("height", &FilmDescription::height)
+        .def_readwrite("crop_x", &FilmDescription::crop_x)
+        .def_readwrite("crop_y", &FilmDescription::crop_y)
+        .def_readwrite("crop_width", &FilmDescription::crop_width)
+        .def_readwrite("crop_height", &FilmDescription::crop_height)
+        .def_readwrite("filter", &FilmDescription::filter)
+        .def_readwrite("filter_width", &FilmDescription::filter_width)
+        .def_readwrite("exposure", &FilmDescription::exposure)
+        .def_readwrite("transparent", &FilmDescription::transparent);
+    py::class_<RenderSettings>(m, "RenderSettings", py::module_local())
+        .def_readwrite("samples", &RenderSettings::samples)
+        .def_readwrite("seed", &RenderSettings::seed)
+        .def_readwrite("time_limit", &RenderSettings::time_limit)
+        .def_readwrite("use_nee", &RenderSettings::use_nee)
+        .def_readwrite("guiding", &RenderSettings::guiding)
+        .def_readwrite("max_bounces", &RenderSettings::max_bounces)
+        .def_readwrite("diffuse_bounces", &RenderSettings::diffuse_bounces)
+        .def_readwrite("glossy_bounces", &RenderSettings::glossy_bounces)
+        .def_readwrite("transmission_bounces", &RenderSettings::transmission_bounces)
+        .def_readwrite("transparent_bounces", &RenderSettings::transparent_bounces)
+        .def_readwrite("caustics_reflective", &RenderSettings::caustics_reflective)
+        .def_readwrite("caustics_refractive", &RenderSettings::caustics_refractive);
+}
+
+void bind_adders(py::class_<SceneDescription>& scene) {
+    scene
+        .def(
+            "add_mesh",
+            [](SceneDescription& s,
+               std::string name,
+               Array<float> positions,
+               Array<std::uint32_t> triangles,
+               NormalDomain domain,
+               std::optional<Array<float>> normals,
+               std::optional<Array<std::uint16_t>> materials,
+               std::vector<NamedUv> uv_maps) {
+                return add_mesh(s,
+                                std::move(name),
+                                {std::move(positions),
+                                 std::move(triangles),
+                                 domain,
+                                 std::move(normals),
+                                 std::move(materials),
+                                 std::move(uv_maps)});
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("positions"),
+            py::arg("triangles"),
+            py::arg("normal_domain") = NormalDomain::Face,
+            py::arg("normals") = py::none(),
+            py::arg("material_indices") = py::none(),
+            py::arg("uv_maps") = std::vector<NamedUv>())
+        .def(
+            "add_material",
+            [](SceneDescription& s, std::string name, NodeProgram program, bool emission_sampling) {
+                s.materials.push_back({std::move(name), std::move(program), emission_sampling});
+                return index_of_last(s.materials.size());
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("program"),
+            py::arg("emission_sampling") = true)
+        .def(
+            "add_material_set",
+            [](SceneDescription& s, std::vector<std::uint32_t> slots) {
+                s.material_sets.push_back(std::move(slots));
+                return index_of_last(s.material_sets.size());
+            },
+            FloatGuard(),
+            py::arg("slots"))
+        .def(
+            "add_instances",
+            [](SceneDescription& s,
+               const std::vector<std::string>& names,
+               Array<float> matrices,
+               Array<std::uint32_t> meshes,
+               Array<std::uint32_t> material_sets,
+               Array<std::uint32_t> visibility) {
+                add_instances(s,
+                              names,
+                              {std::move(matrices),
+                               std::move(meshes),
+                               std::move(material_sets),
+                               std::move(visibility)});
+            },
+            FloatGuard(),
+            py::arg("names"),
+            py::arg("matrices"),
+            py::arg("meshes"),
+            py::arg("material_sets"),
+            py::arg("visibility"));
+    scene
+        .def(
+            "add_image",
+            [](SceneDescription& s,
+               std::string name,
+               std::string path,
+               py::bytes data,
+               std::optional<Array<float>> pixels,
+               ImageColorSpace color_space,
+               ImageAlpha alpha) {
+                ImageDescription image;
+                image.name = std::move(name);
+                image.color_space = color_space;
+                image.alpha = alpha;
+                return add_image(
+                    s, std::move(image), {std::move(path), std::move(data), std::move(pixels)});
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("path") = "",
+            py::arg("data") = py::bytes(),
+            py::arg("pixels") = py::none(),
+            py::arg("color_space") = ImageColorSpace::Srgb,
+            py::arg("alpha") = ImageAlpha::Straight)
+        .def(
+            "add_light",
+            [](SceneDescription& s, const py::kwargs& fields) {
+                assign_fields(s.lights.emplace_back(), fields);
+            },
+            FloatGuard())
+        .def(
+            "set_world",
+            [](SceneDescription& s, const py::kwargs& fields) { assign_fields(s.world, fields); },
+            FloatGuard())
+        .def(
+            "set_camera",
+            [](SceneDescription& s, const py::kwargs& fields) {
+                assign_fields(s.camera, fields);
+                s.has_camera = true;
+            },
+            FloatGuard())
+        .def(
+            "set_film",
+            [](SceneDescription& s, const py::kwargs& fields) { assign_fields(s.film, fields); },
+            FloatGuard())
+        .def(
+            "set_settings",
+            [](SceneDescription& s, const py::kwargs& fields) {
+                assign_fields(s.settings, fields);
+            },
+            FloatGuard());
+}
+
+}  // namespace
+
+void bind_scene(py::module_& m) {
+    bind_parts(m);
+    bind_views(m);
+    py::class_<SceneDescription> scene(m, "SceneDescription", py::module_local());
+    scene.def(py::init([](std::uint32_t blender_version) {
+                  SceneDescription description;
+                  description.blender_version = blender_version;
+                  return description;
+              }),
+              FloatGuard(),
+              py::arg("blender_version") = 304);
+    bind_adders(scene);
+    scene.def_readonly("blender_version", &SceneDescription::blender_version)
+        .def_readonly("has_camera", &SceneDescription::has_camera)
+        .def_readonly("camera", &SceneDescription::camera)
+        .def_readonly("film", &SceneDescription::film)
+        .def_readonly("settings", &SceneDescription::settings)
+        .def_readonly("world", &SceneDescription::world)
+        .def_readonly("lights", &SceneDescription::lights)
+        .def_readonly("images", &SceneDescription::images)
+        .def_readonly("instances", &SceneDescription::instances)
+        .def_readonly("materials", &SceneDescription::materials)
+        .def_readonly("material_sets", &SceneDescription::material_sets)
+        .def_property_readonly("mesh_count",
+                               [](const SceneDescription& s) { return s.meshes.size(); })
+        .def("mesh", &mesh_as_dict, FloatGuard(), py::arg("index"));
+
+    m.def("write_dump", &write_dump, FreeGuard(), py::arg("description"), py::arg("path"));
+    m.def("read_dump", &read_dump, FreeGuard(), py::arg("path"));
+}
+
+}  // namespace pharos

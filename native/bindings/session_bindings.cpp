@@ -1,0 +1,98 @@
+// Render sessions: start, poll, read, cancel.
+#include <chrono>
+#include <span>
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "bindings/bindings.h"
+#include "session/render_session.h"
+
+namespace py = pybind11;
+
+namespace pharos {
+namespace {
+
+bool read_pass(const RenderSession& session,
+               FilmPass pass,
+               py::array_t<float, py::array::c_style>& out) {
+    const std::span<float> pixels(out.mutable_data(), static_cast<std::size_t>(out.size()));
+    const py::gil_scoped_release release;
+    return session.read(pass, pixels);
+}
+
+void bind_results(py::module_& m) {
+    py::class_<SessionProgress>(m, "SessionProgress", py::module_local())
+        .def_readonly("state", &SessionProgress::state)
+        .def_readonly("error", &SessionProgress::error)
+        .def_readonly("samples", &SessionProgress::samples)
+        .def_readonly("total_samples", &SessionProgress::total_samples)
+        .def_readonly("serial", &SessionProgress::serial)
+        .def_readonly("fraction", &SessionProgress::fraction)
+        .def_readonly("elapsed", &SessionProgress::elapsed)
+        .def_readonly("remaining", &SessionProgress::remaining)
+        .def_readonly("noise", &SessionProgress::noise)
+        .def_readonly("memory_bytes", &SessionProgress::memory_bytes)
+        .def_readonly("nonfinite_samples", &SessionProgress::nonfinite_samples);
+    py::class_<StageStatistics>(m, "StageStatistics", py::module_local())
+        .def_readonly("name", &StageStatistics::name)
+        .def_readonly("items", &StageStatistics::items)
+        .def_readonly("seconds", &StageStatistics::seconds);
+    py::class_<SessionStatistics>(m, "SessionStatistics", py::module_local())
+        .def_readonly("stages", &SessionStatistics::stages)
+        .def_readonly("camera_samples", &SessionStatistics::camera_samples)
+        .def_readonly("vertices", &SessionStatistics::vertices)
+        .def_readonly("rays", &SessionStatistics::rays)
+        .def_readonly("build_seconds", &SessionStatistics::build_seconds)
+        .def_readonly("render_cpu_seconds", &SessionStatistics::render_cpu_seconds);
+    py::class_<ReportEntry>(m, "ReportEntry", py::module_local())
+        .def_readonly("severity", &ReportEntry::severity)
+        .def_readonly("object", &ReportEntry::object)
+        .def_readonly("message", &ReportEntry::message);
+}
+
+// The destructor cancels and joins: other Python threads must be able to run meanwhile.
+struct FreeDelete {
+    void operator()(RenderSession* session) const {
+        const py::gil_scoped_release release;
+        delete session;
+    }
+};
+
+}  // namespace
+
+void bind_session(py::module_& m) {
+    bind_results(m);
+    using Holder = std::unique_ptr<RenderSession, FreeDelete>;
+    py::class_<RenderSession, Holder>(m, "RenderSession", py::module_local())
+        .def(py::init([](SceneDescription& description, unsigned threads) {
+                 const py::gil_scoped_release release;
+                 return Holder(new RenderSession(std::move(description), threads));
+             }),
+             FloatGuard(),
+             py::arg("description"),
+             py::arg("threads") = 0,
+             "Takes the description over: it is empty afterwards.")
+        .def("cancel", &RenderSession::cancel, FreeGuard())
+        .def(
+            "wait",
+            [](const RenderSession& session, double seconds) {
+                return session.wait(std::chrono::milliseconds(static_cast<long>(seconds * 1e3)));
+            },
+            FreeGuard(),
+            py::arg("seconds"))
+        .def("progress", &RenderSession::progress, FreeGuard())
+        .def("statistics", &RenderSession::statistics, FreeGuard())
+        .def("report", &RenderSession::report, FreeGuard())
+        .def_property_readonly("width", &RenderSession::width)
+        .def_property_readonly("height", &RenderSession::height)
+        .def("read",
+             &read_pass,
+             FloatGuard(),
+             py::arg("film_pass"),
+             py::arg("out").noconvert(),
+             "Fills `out` (float32, C order, bottom row first); False while there is no picture.");
+}
+
+}  // namespace pharos
