@@ -74,8 +74,11 @@ class Texture {
     [[nodiscard]] std::uint64_t bytes() const { return pixels_.data.size(); }
 
   private:
-    TexturePixels pixels_;
+    [[nodiscard]] Vec4 compute_mean() const;
+
+    TexturePixels pixels_;       // padded, so that a whole vector can be read at the last texel
     bool srgb_encoded_ = false;  // 8-bit: convert after interpolation
+    bool associated_ = false;    // colours are multiplied by alpha
     Vec4 mean_{1.0f, 0.0f, 1.0f, 1.0f};
 };
 
