@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -18,13 +19,48 @@ namespace pharos {
 
 namespace detail {
 
+[[nodiscard]] inline double usable_weight(float weight) {
+    return std::isfinite(weight) && weight > 0.0f ? static_cast<double>(weight) : 0.0;
+}
+
 // Fills cdf (weights.size() + 1 values, 0 ... 1) and returns the sum of the usable weights.
-double build_cdf(std::span<const float> weights, std::span<float> cdf);
+inline double build_cdf(std::span<const float> weights, std::span<float> cdf) {
+    constexpr double kGrid = 0x1p24;
+    double sum = 0.0;
+    for (const float weight : weights) {
+        sum += usable_weight(weight);
+    }
+    const std::size_t cells = weights.size();
+    double prefix = 0.0;
+    for (std::size_t i = 0; i < cells; ++i) {
+        const double share =
+            sum > 0.0 ? prefix / sum : static_cast<double>(i) / static_cast<double>(cells);
+        cdf[i] = static_cast<float>(std::round(std::min(share, 1.0) * kGrid) / kGrid);
+        prefix += usable_weight(weights[i]);
+    }
+    cdf[cells] = 1.0f;
+    return sum;
+}
 
 // guide[b] = the cell that holds b / (guide.size() - 1); the size is a power of two plus one.
-void build_guide(std::span<const float> cdf, std::span<std::uint32_t> guide);
+inline void build_guide(std::span<const float> cdf, std::span<std::uint32_t> guide) {
+    const auto buckets = static_cast<float>(guide.size() - 1);
+    const auto last = static_cast<std::uint32_t>(cdf.size() - 2);
+    std::uint32_t cell = 0;
+    for (std::size_t b = 0; b < guide.size(); ++b) {
+        // The upper end stands for the largest number below 1.
+        const float u = std::min(static_cast<float>(b) / buckets, kOneMinusEpsilon);
+        while (cell < last && cdf[cell + 1] <= u) {
+            ++cell;
+        }
+        guide[b] = cell;
+    }
+}
 
-[[nodiscard]] std::uint32_t guide_buckets(std::size_t cells);  // about one bucket for four cells
+// About one bucket for four cells.
+[[nodiscard]] inline std::uint32_t guide_buckets(std::size_t cells) {
+    return static_cast<std::uint32_t>(std::bit_ceil(std::max<std::size_t>(cells / 4, 1)));
+}
 
 // The cell with cdf[cell] <= u < cdf[cell + 1].
 [[nodiscard]] inline std::uint32_t find_cell(const float* cdf,
@@ -49,8 +85,17 @@ void build_guide(std::span<const float> cdf, std::span<std::uint32_t> guide);
 
 class Distribution1D {
   public:
-    Distribution1D();  // uniform, one cell
-    explicit Distribution1D(std::span<const float> weights);
+    Distribution1D() : Distribution1D(std::span<const float>{}) {}  // uniform, one cell
+
+    explicit Distribution1D(std::span<const float> weights) {
+        constexpr float kOne = 1.0f;
+        const std::span<const float> used = weights.empty() ? std::span(&kOne, 1) : weights;
+        cdf_.resize(used.size() + 1);
+        sum_ = detail::build_cdf(used, cdf_);
+        buckets_ = detail::guide_buckets(used.size());
+        guide_.resize(buckets_ + 1);
+        detail::build_guide(cdf_, guide_);
+    }
 
     struct Sample {
         float x = 0.0f;
