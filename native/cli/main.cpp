@@ -20,7 +20,8 @@ constexpr const char* kUsage =
     "  --snapshots A,B    also write OUT.A.exr, OUT.B.exr after that many samples\n"
     "  --stats            print work and time per stage\n"
     "  --stats-json FILE  write the same, with the snapshots' CPU seconds, as JSON\n"
-    "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write OUT)\n";
+    "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write "
+    "OUT)\n";
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 // CHECK for programmer errors: prints both values and aborts. DCHECK only with PHAROS_CHECKS.
-// User input and misuse of the API are never CHECKed: they are reported or throw std::invalid_argument.
+// User input and misuse of the API are never CHECKed: they are reported or throw
+// std::invalid_argument.
 #pragma once
 
 #include <cstdio>
@@ -21,14 +22,14 @@ template <class A, class B>
 
 #define PHAROS_STRING2(x) #x
 #define PHAROS_STRING(x) PHAROS_STRING2(x)
-#define PHAROS_CHECK_OP(a, op, b)                                                                \
-    do {                                                                                         \
-        const auto& check_a = (a);                                                               \
-        const auto& check_b = (b);                                                               \
-        if (!(check_a op check_b)) {                                                             \
-            ::pharos::detail::check_failed(                                                      \
-                #a " " #op " " #b, check_a, check_b, __FILE__ ":" PHAROS_STRING(__LINE__));      \
-        }                                                                                        \
+#define PHAROS_CHECK_OP(a, op, b)                                                           \
+    do {                                                                                    \
+        const auto& check_a = (a);                                                          \
+        const auto& check_b = (b);                                                          \
+        if (!(check_a op check_b)) {                                                        \
+            ::pharos::detail::check_failed(                                                 \
+                #a " " #op " " #b, check_a, check_b, __FILE__ ":" PHAROS_STRING(__LINE__)); \
+        }                                                                                   \
     } while (false)
 
 #define CHECK_EQ(a, b) PHAROS_CHECK_OP(a, ==, b)

@@ -9,7 +9,9 @@ namespace pharos {
     return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z;
 }
 
-[[nodiscard]] inline float average(const Rgb& c) { return (c.x + c.y + c.z) * (1.0f / 3.0f); }
+[[nodiscard]] inline float average(const Rgb& c) {
+    return (c.x + c.y + c.z) * (1.0f / 3.0f);
+}
 
 [[nodiscard]] inline float srgb_to_linear(float v) {
     return v < 0.04045f ? v * (1.0f / 12.92f) : std::pow((v + 0.055f) * (1.0f / 1.055f), 2.4f);

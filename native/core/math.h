@@ -1,16 +1,17 @@
 // Vectors, frames, rays and bounds of the whole project: GLM types under the field's names.
 //
-// Contract: float32, right-handed, metres. Every GLM value is zero-initialised (GLM_FORCE_CTOR_INIT).
-// Points, vectors and normals share Vec3; how one is transformed is said by the function's name.
+// Contract: float32, right-handed, metres. Every GLM value is zero-initialised
+// (GLM_FORCE_CTOR_INIT). Points, vectors and normals share Vec3; how one is transformed is said by
+// the function's name.
 #pragma once
-
-#include <glm/glm.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
+
+#include <glm/glm.hpp>
 
 namespace pharos {
 
@@ -27,21 +28,37 @@ inline constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;  // largest float below 1
 
-[[nodiscard]] inline float sqr(float x) { return x * x; }
+[[nodiscard]] inline float sqr(float x) {
+    return x * x;
+}
 
-[[nodiscard]] inline float safe_sqrt(float x) { return std::sqrt(std::max(x, 0.0f)); }
+[[nodiscard]] inline float safe_sqrt(float x) {
+    return std::sqrt(std::max(x, 0.0f));
+}
 
-[[nodiscard]] inline float saturate(float x) { return std::clamp(x, 0.0f, 1.0f); }
+[[nodiscard]] inline float saturate(float x) {
+    return std::clamp(x, 0.0f, 1.0f);
+}
 
-[[nodiscard]] inline float lerp(float a, float b, float t) { return a + (b - a) * t; }
+[[nodiscard]] inline float lerp(float a, float b, float t) {
+    return a + (b - a) * t;
+}
 
-[[nodiscard]] inline Vec3 lerp(const Vec3& a, const Vec3& b, float t) { return a + (b - a) * t; }
+[[nodiscard]] inline Vec3 lerp(const Vec3& a, const Vec3& b, float t) {
+    return a + (b - a) * t;
+}
 
-[[nodiscard]] inline float length_squared(const Vec3& v) { return glm::dot(v, v); }
+[[nodiscard]] inline float length_squared(const Vec3& v) {
+    return glm::dot(v, v);
+}
 
-[[nodiscard]] inline float max_component(const Vec3& v) { return std::max(v.x, std::max(v.y, v.z)); }
+[[nodiscard]] inline float max_component(const Vec3& v) {
+    return std::max(v.x, std::max(v.y, v.z));
+}
 
-[[nodiscard]] inline bool is_zero(const Vec3& v) { return v.x == 0 && v.y == 0 && v.z == 0; }
+[[nodiscard]] inline bool is_zero(const Vec3& v) {
+    return v.x == 0 && v.y == 0 && v.z == 0;
+}
 
 [[nodiscard]] inline bool is_finite(const Vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -53,13 +70,19 @@ inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;  // largest float belo
     return squared > 1e-30f && squared < 1e30f ? v * (1.0f / std::sqrt(squared)) : fallback;
 }
 
-[[nodiscard]] inline Vec3 transform_point(const Mat4& m, const Vec3& p) { return Vec3(m * Vec4(p, 1.0f)); }
+[[nodiscard]] inline Vec3 transform_point(const Mat4& m, const Vec3& p) {
+    return Vec3(m * Vec4(p, 1.0f));
+}
 
-[[nodiscard]] inline Vec3 transform_vector(const Mat4& m, const Vec3& v) { return Vec3(m * Vec4(v, 0.0f)); }
+[[nodiscard]] inline Vec3 transform_vector(const Mat4& m, const Vec3& v) {
+    return Vec3(m * Vec4(v, 0.0f));
+}
 
 // `inverse` is the inverse of the matrix that transforms points. Not normalised.
 [[nodiscard]] inline Vec3 transform_normal(const Mat4& inverse, const Vec3& n) {
-    return Vec3(glm::dot(Vec3(inverse[0]), n), glm::dot(Vec3(inverse[1]), n), glm::dot(Vec3(inverse[2]), n));
+    return Vec3(glm::dot(Vec3(inverse[0]), n),
+                glm::dot(Vec3(inverse[1]), n),
+                glm::dot(Vec3(inverse[2]), n));
 }
 
 // Orthonormal basis around z (Duff et al. 2017, branch-free).

@@ -1,5 +1,7 @@
 #include "core/parallel.h"
 
+#include <utility>
+
 #include "core/fp_state.h"
 
 namespace pharos {

@@ -1,8 +1,9 @@
-// A small pool of real threads: thread counts are what they say, and nothing is shared with the host.
+// A small pool of real threads: thread counts are what they say, and nothing is shared with the
+// host.
 //
 // Contract: run() calls body(worker) once on each of size() workers, worker 0 being the caller, and
-// returns when all have. parallel_for() hands out [0, count) by an atomic counter. The first exception
-// of any worker is rethrown in the caller; the others are dropped. Not reentrant.
+// returns when all have. parallel_for() hands out [0, count) by an atomic counter. The first
+// exception of any worker is rethrown in the caller; the others are dropped. Not reentrant.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
-// What of the user's input could not be used as given, collected instead of thrown: a missing image,
-// a broken index, a non-finite vertex. The host shows the list; rendering goes on around it.
+// What of the user's input could not be used as given, collected instead of thrown: a missing
+// image, a broken index, a non-finite vertex. The host shows the list; rendering goes on around it.
 #pragma once
 
 #include <string>

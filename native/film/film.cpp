@@ -27,7 +27,9 @@ int film_pass_channels(FilmPass pass) {
 }
 
 Film::Film(const FilmDescription& description)
-    : width_(description.crop_width), height_(description.crop_height), exposure_(description.exposure) {
+    : width_(description.crop_width),
+      height_(description.crop_height),
+      exposure_(description.exposure) {
     const std::size_t pixels = std::size_t{width_} * height_;
     sum_.resize(pixels * 4);
     half_sum_.resize(pixels * 3);
@@ -53,7 +55,8 @@ void Film::add(std::uint32_t pixel, const FilmSample& sample, double weight, boo
     }
     sum[3] += weight * static_cast<double>(sample.alpha);
     if (count_[pixel] == 0) {
-        depth_[pixel] = sample.depth;  // as Cycles: of one sample, an average would lie between surfaces
+        depth_[pixel] =
+            sample.depth;  // as Cycles: of one sample, an average would lie between surfaces
     }
     weight_[pixel] += weight;
     half_weight_[pixel] += even ? weight : 0.0;
@@ -68,7 +71,9 @@ void Film::read(FilmPass pass, std::span<float> out) const {
         std::copy(depth_.begin(), depth_.end(), out.begin());
         return;
     }
-    const std::size_t aux_offset = pass == FilmPass::Normal ? 0 : pass == FilmPass::DenoisingNormal ? 3 : 6;
+    const std::size_t aux_offset = pass == FilmPass::Normal            ? 0
+                                   : pass == FilmPass::DenoisingNormal ? 3
+                                                                       : 6;
     for (std::size_t i = 0; i < pixels; ++i) {
         const double scale = weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
         float* pixel = &out[i * channels];

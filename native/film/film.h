@@ -1,8 +1,8 @@
 // The picture as it grows: per-pixel sums in double, and the passes a host can read.
 //
-// A batch of paths owns its pixels, so adding needs no lock. Every pass of samples has a weight fixed
-// by its number; a pixel's value is the weighted sum over the sum of weights. Half of the passes also go
-// to a second sum, from whose difference the noise of the picture is estimated.
+// A batch of paths owns its pixels, so adding needs no lock. Every pass of samples has a weight
+// fixed by its number; a pixel's value is the weighted sum over the sum of weights. Half of the
+// passes also go to a second sum, from whose difference the noise of the picture is estimated.
 // Coordinates are those of the rendered window, row 0 at the bottom.
 #pragma once
 
@@ -20,13 +20,20 @@ namespace pharos {
 struct FilmSample {
     Rgb radiance{0.0f};
     float alpha = 1.0f;
-    Vec3 normal{0.0f};  // first hit, world space
-    Rgb albedo{0.0f};   // first non-delta hit's albedo estimate
+    Vec3 normal{0.0f};        // first hit, world space
+    Rgb albedo{0.0f};         // first non-delta hit's albedo estimate
     Vec3 guide_normal{0.0f};  // of the same hit, for denoising
     float depth = 1e10f;      // first hit along the camera's axis; 1e10 where nothing was hit
 };
 
-enum class FilmPass : std::uint8_t { Combined, Depth, Normal, DenoisingNormal, DenoisingAlbedo, SampleCount };
+enum class FilmPass : std::uint8_t {
+    Combined,
+    Depth,
+    Normal,
+    DenoisingNormal,
+    DenoisingAlbedo,
+    SampleCount
+};
 
 [[nodiscard]] int film_pass_channels(FilmPass pass);  // 4, 1, 3, 3, 3, 1
 
@@ -35,10 +42,11 @@ class Film {
     explicit Film(const FilmDescription& description);
 
     [[nodiscard]] std::uint32_t width() const { return width_; }
+
     [[nodiscard]] std::uint32_t height() const { return height_; }
 
-    // Adds one sample to a pixel; `even` says which half the pass belongs to. Non-finite radiance must
-    // have been dropped by the caller (and counted): DCHECKed here.
+    // Adds one sample to a pixel; `even` says which half the pass belongs to. Non-finite radiance
+    // must have been dropped by the caller (and counted): DCHECKed here.
     void add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even);
 
     // Writes width * height * channels floats; a pixel without samples is 0 (depth: 1e10).

@@ -48,7 +48,8 @@ struct Integrator::Worker {
 Integrator::Integrator(const Scene& scene, ThreadPool& pool)
     : scene_(scene),
       pool_(pool),
-      camera_(scene.description.camera, scene.description.film.width, scene.description.film.height),
+      camera_(
+          scene.description.camera, scene.description.film.width, scene.description.film.height),
       filter_(scene.description.film.filter, scene.description.film.filter_width) {
     for (unsigned worker = 0; worker < pool.size(); ++worker) {
         workers_.push_back(std::make_unique<Worker>());
@@ -62,28 +63,46 @@ std::uint32_t Integrator::batches_per_sample() const {
     return (film.crop_width * film.crop_height + kBatchPaths - 1) / kBatchPaths;
 }
 
-void Integrator::render_batch(const RenderContext& context, const BatchWork& work, Worker& worker) const {
+void Integrator::render_batch(const RenderContext& context,
+                              const BatchWork& work,
+                              Worker& worker) const {
     PathBatch& batch = worker.batch;
     BatchStatistics& statistics = worker.statistics;
-    timed(statistics, Stage::GenerateCameraRays, [&] { return generate_camera_rays(context, work, batch); });
+    timed(statistics, Stage::GenerateCameraRays, [&] {
+        return generate_camera_rays(context, work, batch);
+    });
     statistics.camera_samples += work.pixels;
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
-        timed(statistics, Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
-        timed(statistics, Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
-        timed(statistics, Stage::AddEscapedRadiance, [&] { return add_escaped_radiance(context, batch); });
-        timed(statistics, Stage::EvaluateMaterials, [&] { return evaluate_materials(context, batch); });
+        timed(
+            statistics, Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
+        timed(
+            statistics, Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
+        timed(statistics, Stage::AddEscapedRadiance, [&] {
+            return add_escaped_radiance(context, batch);
+        });
+        timed(statistics, Stage::EvaluateMaterials, [&] {
+            return evaluate_materials(context, batch);
+        });
         statistics.vertices += batch.surfaces.size();
-        timed(statistics, Stage::AddEmittedRadiance, [&] { return add_emitted_radiance(context, batch); });
-        timed(statistics, Stage::SampleDirectLight, [&] { return sample_direct_light(context, batch); });
+        timed(statistics, Stage::AddEmittedRadiance, [&] {
+            return add_emitted_radiance(context, batch);
+        });
+        timed(statistics, Stage::SampleDirectLight, [&] {
+            return sample_direct_light(context, batch);
+        });
         statistics.rays += batch.shadow_rays.size();
-        timed(statistics, Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
-        timed(statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
+        timed(
+            statistics, Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
+        timed(
+            statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
     }
     statistics.nonfinite += finish_paths(batch);
 }
 
-bool Integrator::render_pass(const PassSettings& pass, SharedFilm& film, const StopCondition& stop) {
+bool Integrator::render_pass(const PassSettings& pass,
+                             SharedFilm& film,
+                             const StopCondition& stop) {
     const RenderContext context{scene_, camera_, filter_, pass};
     const std::uint32_t pixels = film.film.width() * film.film.height();
     std::atomic<bool> complete{true};

@@ -1,9 +1,9 @@
 // The path tracer: renders passes of a scene into a film on a pool of threads.
 //
-// Estimator: unidirectional path tracing with next-event estimation and scattering joined by multiple
-// importance sampling (Veach 1997, power heuristic); wavefront stages over batches that fit a core's
-// cache (Laine et al. 2013 give the reason, stages.h the order). The picture depends on the scene and
-// the pass numbers alone, not on the number of threads.
+// Estimator: unidirectional path tracing with next-event estimation and scattering joined by
+// multiple importance sampling (Veach 1997, power heuristic); wavefront stages over batches that
+// fit a core's cache (Laine et al. 2013 give the reason, stages.h the order). The picture depends
+// on the scene and the pass numbers alone, not on the number of threads.
 #pragma once
 
 #include <atomic>
@@ -51,12 +51,15 @@ class Integrator {
     bool render_pass(const PassSettings& pass, SharedFilm& film, const StopCondition& stop);
 
     [[nodiscard]] std::uint32_t batches_per_sample() const;
+
     [[nodiscard]] const BatchStatistics& statistics() const { return total_; }
 
   private:
     struct Worker;
 
-    void render_batch(const RenderContext& context, const struct BatchWork& work, Worker& worker) const;
+    void render_batch(const RenderContext& context,
+                      const struct BatchWork& work,
+                      Worker& worker) const;
 
     const Scene& scene_;
     ThreadPool& pool_;

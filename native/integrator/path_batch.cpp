@@ -15,7 +15,13 @@ PathBatch::PathBatch(std::uint32_t size) : capacity(size) {
     origin.resize(size);
     counters.resize(size);
     path_visibility.resize(size);
-    for (auto* list : {&active, &visibility, &next_active, &next_visibility, &surface_path, &material_order, &escaped}) {
+    for (auto* list : {&active,
+                       &visibility,
+                       &next_active,
+                       &next_visibility,
+                       &surface_path,
+                       &material_order,
+                       &escaped}) {
         list->reserve(size);
     }
     rays.reserve(size);

@@ -1,8 +1,9 @@
 // The state of one thread's batch of paths: structure of arrays, reused from batch to batch.
 //
 // A *root* is one camera sample (pixel and sample index); a *path* is one of possibly several
-// continuations of it (splitting). Paths in flight are listed in `active`, in a fixed order; the arrays
-// under "rays" run parallel to `active`, those under "surfaces" parallel to the hits among them.
+// continuations of it (splitting). Paths in flight are listed in `active`, in a fixed order; the
+// arrays under "rays" run parallel to `active`, those under "surfaces" parallel to the hits among
+// them.
 #pragma once
 
 #include <cstdint>
@@ -19,16 +20,17 @@ namespace pharos {
 
 // Bounce counters by Cycles' meaning (cycles-parity 2.4) and what the last scattering was.
 struct PathCounters {
-    std::uint16_t depth = 0;        // vertices so far, transparent ones included: sampler dimensions
-    std::uint16_t bounce = 0;       // scatterings, transparent ones excluded
+    std::uint16_t depth = 0;   // vertices so far, transparent ones included: sampler dimensions
+    std::uint16_t bounce = 0;  // scatterings, transparent ones excluded
     std::uint16_t diffuse = 0;
     std::uint16_t glossy = 0;
     std::uint16_t transmission = 0;
     std::uint16_t transparent = 0;
-    bool terminate_at_surface = false;  // a limit was reached: emission of the next surface, then the end
-    bool from_camera = true;            // nothing but transparent surfaces since the camera
-    bool after_diffuse = false;         // some scattering so far was diffuse (caustics switches)
-    bool features_done = false;         // albedo and normal for denoising are taken
+    bool terminate_at_surface =
+        false;                   // a limit was reached: emission of the next surface, then the end
+    bool from_camera = true;     // nothing but transparent surfaces since the camera
+    bool after_diffuse = false;  // some scattering so far was diffuse (caustics switches)
+    bool features_done = false;  // albedo and normal for denoising are taken
 };
 
 // A shadow ray waiting for its answer.
@@ -39,9 +41,9 @@ struct ShadowRay {
 
 // Light samples whose radiance a node program gives.
 struct PendingLight {
-    SurfaceInteraction emitter;   // emissive triangle
-    Vec3 direction;               // world
-    std::uint32_t shadow = 0;     // into shadow_rays
+    SurfaceInteraction emitter;  // emissive triangle
+    Vec3 direction;              // world
+    std::uint32_t shadow = 0;    // into shadow_rays
 };
 
 struct PathBatch {
@@ -61,11 +63,12 @@ struct PathBatch {
     std::vector<std::uint32_t> sample_index;
     std::vector<Rgb> beta;
     std::vector<Rgb> radiance;
-    std::vector<Rgb> albedo_product;        // for roulette
-    std::vector<float> scatter_pdf;         // solid angle, of the last scattering; 0: camera or delta
-    std::vector<LightSampleContext> origin; // of the last scattering, for MIS of chance hits
+    std::vector<Rgb> albedo_product;  // for roulette
+    std::vector<float> scatter_pdf;   // solid angle, of the last scattering; 0: camera or delta
+    std::vector<LightSampleContext> origin;  // of the last scattering, for MIS of chance hits
     std::vector<PathCounters> counters;
-    std::vector<std::uint32_t> path_visibility;  // bit of the last scattering that was not transparent
+    std::vector<std::uint32_t>
+        path_visibility;  // bit of the last scattering that was not transparent
 
     // --- rays, parallel to active ---
     std::vector<std::uint32_t> active;

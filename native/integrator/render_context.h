@@ -70,7 +70,9 @@ struct BatchStatistics {
     std::uint64_t rays = 0;
     std::uint64_t nonfinite = 0;
 
-    [[nodiscard]] StageCounter& operator[](Stage stage) { return stages[static_cast<std::size_t>(stage)]; }
+    [[nodiscard]] StageCounter& operator[](Stage stage) {
+        return stages[static_cast<std::size_t>(stage)];
+    }
 
     void add(const BatchStatistics& other);
 };

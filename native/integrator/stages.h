@@ -1,5 +1,5 @@
-// The stages of a path's life over a whole batch; one function and one file each, called in this order
-// by render_batch() (integrator.cpp) until no path is left.
+// The stages of a path's life over a whole batch; one function and one file each, called in this
+// order by render_batch() (integrator.cpp) until no path is left.
 //
 // Every stage reads and writes the batch only, and returns the number of items it worked on.
 #pragma once
@@ -12,14 +12,17 @@
 
 namespace pharos {
 
-// The camera samples of a batch: pixels [first, first + count) of the rendered window, one sample index.
+// The camera samples of a batch: pixels [first, first + count) of the rendered window, one sample
+// index.
 struct BatchWork {
     std::uint32_t first_pixel = 0;
     std::uint32_t pixels = 0;
     std::uint32_t sample = 0;
 };
 
-std::uint64_t generate_camera_rays(const RenderContext& context, const BatchWork& work, PathBatch& batch);
+std::uint64_t generate_camera_rays(const RenderContext& context,
+                                   const BatchWork& work,
+                                   PathBatch& batch);
 
 // Fills batch.hits.
 std::uint64_t intersect_closest(const RenderContext& context, PathBatch& batch);

@@ -12,7 +12,8 @@ struct Polynomial {
     std::array<std::uint32_t, 3> m;
 };
 
-constexpr std::array<Polynomial, 3> kPolynomials{{{1, 0, {1, 0, 0}}, {2, 1, {1, 3, 0}}, {3, 1, {1, 3, 1}}}};
+constexpr std::array<Polynomial, 3> kPolynomials{
+    {{1, 0, {1, 0, 0}}, {2, 1, {1, 3, 0}}, {3, 1, {1, 3, 1}}}};
 
 std::array<std::uint32_t, 32> direction_numbers(const Polynomial& polynomial) {
     std::array<std::uint32_t, 32> v{};

@@ -1,9 +1,9 @@
 // Owen-scrambled Sobol points: sample i of pixel (x, y) depends on (seed, x, y, i) alone.
 //
 // Hash-based nested uniform scrambling of shuffled four-dimensional Sobol sets (Burley, "Practical
-// Hash-based Owen Scrambling", JCGT 9(4), 2020; the permutation is that of Laine and Karras 2011 with
-// the multipliers published by Vegdahl). Every set of four dimensions is shuffled on its own, so any
-// number of sets can be drawn. Values are in [0, 1).
+// Hash-based Owen Scrambling", JCGT 9(4), 2020; the permutation is that of Laine and Karras 2011
+// with the multipliers published by Vegdahl). Every set of four dimensions is shuffled on its own,
+// so any number of sets can be drawn. Values are in [0, 1).
 #pragma once
 
 #include <array>
@@ -55,7 +55,9 @@ extern const SobolTables kSobolTables;
 }
 
 // The random sequence of a pixel: hash once, then index by sample.
-[[nodiscard]] constexpr std::uint32_t pixel_hash(std::uint32_t seed, std::uint32_t x, std::uint32_t y) {
+[[nodiscard]] constexpr std::uint32_t pixel_hash(std::uint32_t seed,
+                                                 std::uint32_t x,
+                                                 std::uint32_t y) {
     return hash_combine(hash_combine(hash_combine(0x2545f491u, seed), x), y);
 }
 
@@ -81,7 +83,8 @@ extern const SobolTables kSobolTables;
     std::uint32_t dimension_seed = seed;
     for (std::size_t d = 0; d < 4; ++d) {
         dimension_seed = dimension_seed * 0x915f77f5u + 0x6c078965u;
-        const std::uint32_t scrambled = scramble_reversed(reversed[d], dimension_seed ^ (dimension_seed >> 15));
+        const std::uint32_t scrambled =
+            scramble_reversed(reversed[d], dimension_seed ^ (dimension_seed >> 15));
         point[static_cast<int>(d)] = bits_to_unit_float(reverse_bits(scrambled));
     }
     return point;

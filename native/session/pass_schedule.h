@@ -14,8 +14,11 @@ namespace pharos {
 inline constexpr std::uint64_t kPathsPerPass = 1u << 19;
 
 // The pass after `done` samples of `total` on a window of `pixels`; samples is 0 at the end.
-[[nodiscard]] inline PassSettings next_pass(std::uint32_t done, std::uint32_t total, std::uint64_t pixels) {
-    const std::uint64_t fitting = std::max<std::uint64_t>(1, kPathsPerPass / std::max<std::uint64_t>(1, pixels));
+[[nodiscard]] inline PassSettings next_pass(std::uint32_t done,
+                                            std::uint32_t total,
+                                            std::uint64_t pixels) {
+    const std::uint64_t fitting =
+        std::max<std::uint64_t>(1, kPathsPerPass / std::max<std::uint64_t>(1, pixels));
     const auto samples = static_cast<std::uint32_t>(
         std::min<std::uint64_t>({fitting, std::max<std::uint32_t>(1, done), total - done}));
     return {done, samples, 1.0};

@@ -77,6 +77,7 @@ struct RenderSession::Impl {
     void render(const Scene& scene);
     void finish_pass(const Integrator& integrator, std::uint32_t samples, double cpu_seconds);
     void end(SessionState state, const std::string& error);
+
     [[nodiscard]] bool is_ended() const { return progress.state >= SessionState::Finished; }
 };
 
@@ -155,7 +156,9 @@ void RenderSession::Impl::render(const Scene& scene) {
     }
 }
 
-void RenderSession::Impl::finish_pass(const Integrator& integrator, std::uint32_t samples, double cpu_seconds) {
+void RenderSession::Impl::finish_pass(const Integrator& integrator,
+                                      std::uint32_t samples,
+                                      double cpu_seconds) {
     const BatchStatistics& batch = integrator.statistics();
     const double noise = [&] {
         const std::shared_lock film_lock(film->mutex);
@@ -175,7 +178,8 @@ void RenderSession::Impl::finish_pass(const Integrator& integrator, std::uint32_
     statistics.vertices = batch.vertices;
     statistics.rays = batch.rays;
     statistics.render_cpu_seconds = cpu_seconds;
-    while (snapshots.size() < snapshot_samples.size() && snapshot_samples[snapshots.size()] <= samples) {
+    while (snapshots.size() < snapshot_samples.size() &&
+           snapshot_samples[snapshots.size()] <= samples) {
         SessionSnapshot snapshot{samples, cpu_seconds, {}};
         snapshot.combined.resize(std::size_t{width} * height * 4);
         film->film.read(FilmPass::Combined, snapshot.combined);
@@ -192,8 +196,9 @@ RenderSession::RenderSession(SceneDescription description,
     impl_->height = description.film.crop_height;
     std::ranges::sort(snapshot_samples);
     impl_->snapshot_samples = std::move(snapshot_samples);
-    impl_->driver = std::jthread(
-        [impl = impl_.get(), scene = std::move(description)]() mutable { impl->run(std::move(scene)); });
+    impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
+        impl->run(std::move(scene));
+    });
 }
 
 RenderSession::~RenderSession() {
@@ -221,8 +226,10 @@ SessionProgress RenderSession::progress() const {
         return progress;
     }
     progress.elapsed = seconds_since(*impl_->render_begin);
-    const double samples = static_cast<double>(progress.serial) / static_cast<double>(impl_->batches_per_sample);
-    progress.fraction = std::min(1.0, samples / std::max(1.0, static_cast<double>(progress.total_samples)));
+    const double samples =
+        static_cast<double>(progress.serial) / static_cast<double>(impl_->batches_per_sample);
+    progress.fraction =
+        std::min(1.0, samples / std::max(1.0, static_cast<double>(progress.total_samples)));
     progress.remaining = progress.fraction > 0.0
                              ? progress.elapsed * (1.0 - progress.fraction) / progress.fraction
                              : 0.0;
@@ -253,11 +260,12 @@ std::uint32_t RenderSession::height() const {
 }
 
 bool RenderSession::read(FilmPass pass, std::span<float> out) const {
-    const std::size_t expected =
-        std::size_t{impl_->width} * impl_->height * static_cast<std::size_t>(film_pass_channels(pass));
+    const std::size_t expected = std::size_t{impl_->width} * impl_->height *
+                                 static_cast<std::size_t>(film_pass_channels(pass));
     if (out.size() != expected) {
-        throw std::invalid_argument("RenderSession.read: the buffer holds " + std::to_string(out.size()) +
-                                    " floats, the pass has " + std::to_string(expected));
+        throw std::invalid_argument("RenderSession.read: the buffer holds " +
+                                    std::to_string(out.size()) + " floats, the pass has " +
+                                    std::to_string(expected));
     }
     std::shared_ptr<SharedFilm> film;
     {

@@ -1,4 +1,5 @@
-// A render from description to finished passes on threads of its own; hosts start, poll, read, cancel.
+// A render from description to finished passes on threads of its own; hosts start, poll, read,
+// cancel.
 //
 // All functions are thread-safe and return at once, except wait(), read() (copies a pass: some
 // milliseconds) and the destructor (cancels and joins). Nothing here calls back into the host.
@@ -21,15 +22,15 @@ enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelle
 
 struct SessionProgress {
     SessionState state = SessionState::Building;
-    std::string error;              // state Failed: one sentence
-    std::uint32_t samples = 0;      // finished passes of the whole frame
+    std::string error;          // state Failed: one sentence
+    std::uint32_t samples = 0;  // finished passes of the whole frame
     std::uint32_t total_samples = 0;
-    std::uint64_t serial = 0;       // grows whenever the picture has changed
-    double fraction = 0.0;          // 0 ... 1, including the time limit
-    double elapsed = 0.0;           // seconds since start of rendering
-    double remaining = 0.0;         // estimate, seconds
-    double noise = 1.0;             // Film::noise()
-    std::uint64_t memory_bytes = 0; // scene and film
+    std::uint64_t serial = 0;        // grows whenever the picture has changed
+    double fraction = 0.0;           // 0 ... 1, including the time limit
+    double elapsed = 0.0;            // seconds since start of rendering
+    double remaining = 0.0;          // estimate, seconds
+    double noise = 1.0;              // Film::noise()
+    std::uint64_t memory_bytes = 0;  // scene and film
     std::uint64_t nonfinite_samples = 0;
 };
 
@@ -58,8 +59,9 @@ struct SessionSnapshot {
 
 class RenderSession {
   public:
-    // Takes the description; work begins at once on threads of the session. threads 0: one per core.
-    // A snapshot is kept at the end of the first pass that reaches each of `snapshot_samples`.
+    // Takes the description; work begins at once on threads of the session. threads 0: one per
+    // core. A snapshot is kept at the end of the first pass that reaches each of
+    // `snapshot_samples`.
     explicit RenderSession(SceneDescription description,
                            unsigned threads = 0,
                            std::vector<std::uint32_t> snapshot_samples = {});
@@ -80,9 +82,9 @@ class RenderSession {
     [[nodiscard]] std::uint32_t width() const;  // of the rendered window
     [[nodiscard]] std::uint32_t height() const;
 
-    // The newest complete state of a pass: width * height * film_pass_channels(pass) floats, bottom row
-    // first. False while there is no picture yet (out is untouched). Throws std::invalid_argument for a
-    // wrong size.
+    // The newest complete state of a pass: width * height * film_pass_channels(pass) floats, bottom
+    // row first. False while there is no picture yet (out is untouched). Throws
+    // std::invalid_argument for a wrong size.
     bool read(FilmPass pass, std::span<float> out) const;
 
   private:

@@ -21,7 +21,8 @@ std::uint64_t add_emitted_radiance(const RenderContext& context, PathBatch& batc
             // Distance from the vertex: transparent surfaces in between restarted the ray.
             const float t = glm::distance(rival->p, surface.p);
             const float cos_light = glm::dot(surface.ng, surface.wo);
-            light_pdf = scene.lights->pdf_triangle(*rival, surface.instance, surface.triangle, t, cos_light);
+            light_pdf = scene.lights->pdf_triangle(
+                *rival, surface.instance, surface.triangle, t, cos_light);
         }
         const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
         batch.radiance[path] += batch.beta[path] * emission * weight;

@@ -17,8 +17,11 @@ void add_world(const RenderContext& context, PathBatch& batch) {
         for (const std::uint32_t i : batch.escaped) {
             batch.escaped_directions.push_back(batch.rays[i].direction);
         }
-        evaluate_world(
-            scene.world, scene.shading, batch.escaped_directions, batch.scratch, batch.escaped_radiance);
+        evaluate_world(scene.world,
+                       scene.shading,
+                       batch.escaped_directions,
+                       batch.scratch,
+                       batch.escaped_radiance);
     }
     const bool sampled = scene.environment != nullptr && !scene.lights->empty();
     for (std::size_t k = 0; k < count; ++k) {
@@ -29,8 +32,9 @@ void add_world(const RenderContext& context, PathBatch& batch) {
             continue;
         }
         const LightSampleContext* rival = rival_context(batch, path);
-        const float light_pdf =
-            sampled && rival ? scene.lights->pdf_environment(*rival, batch.rays[i].direction) : 0.0f;
+        const float light_pdf = sampled && rival
+                                    ? scene.lights->pdf_environment(*rival, batch.rays[i].direction)
+                                    : 0.0f;
         const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
         batch.radiance[path] += batch.beta[path] * batch.escaped_radiance[k] * weight;
     }
@@ -44,7 +48,8 @@ void add_suns(const RenderContext& context, PathBatch& batch) {
             continue;  // as in Cycles, the camera itself sees no lamp
         }
         for (std::uint32_t sun = 0; sun < lights.sun_count(); ++sun) {
-            const auto hit = lights.sun_hit(sun, batch.rays[i].direction, rival_context(batch, path));
+            const auto hit =
+                lights.sun_hit(sun, batch.rays[i].direction, rival_context(batch, path));
             if (hit && (hit->visibility & batch.visibility[i])) {
                 const float weight = chance_hit_weight(context, batch.scatter_pdf[path], hit->pdf);
                 batch.radiance[path] += batch.beta[path] * hit->L * weight;

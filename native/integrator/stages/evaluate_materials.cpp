@@ -24,7 +24,8 @@ void group_by_material(const RenderContext& context, PathBatch& batch) {
     for (const SurfaceInteraction& surface : batch.surfaces) {
         ++batch.material_count[surface.material + 1];
     }
-    std::partial_sum(batch.material_count.begin(), batch.material_count.end(), batch.material_count.begin());
+    std::partial_sum(
+        batch.material_count.begin(), batch.material_count.end(), batch.material_count.begin());
     batch.material_order.resize(batch.surfaces.size());
     for (std::uint32_t s = 0; s < batch.surfaces.size(); ++s) {
         batch.material_order[batch.material_count[batch.surfaces[s].material]++] = s;
@@ -40,10 +41,12 @@ void drop_caustics(const RenderSettings& settings, PathBatch& batch) {
         Closure* closures = &batch.closures.closures[batch.closures.first[s]];
         for (std::uint32_t c = 0; c < batch.closures.count[s]; ++c) {
             const ClosureType type = closures[c].type;
-            const bool reflects = type == ClosureType::GgxReflection || type == ClosureType::GgxGlass ||
-                                  type == ClosureType::Clearcoat;
-            const bool refracts = type == ClosureType::GgxRefraction || type == ClosureType::GgxGlass;
-            if ((reflects && !settings.caustics_reflective) || (refracts && !settings.caustics_refractive)) {
+            const bool reflects = type == ClosureType::GgxReflection ||
+                                  type == ClosureType::GgxGlass || type == ClosureType::Clearcoat;
+            const bool refracts =
+                type == ClosureType::GgxRefraction || type == ClosureType::GgxGlass;
+            if ((reflects && !settings.caustics_reflective) ||
+                (refracts && !settings.caustics_refractive)) {
                 closures[c].weight = Rgb(0.0f);
                 closures[c].sample_weight = 0.0f;
             }
@@ -56,8 +59,8 @@ void make_bsdfs(PathBatch& batch) {
     batch.bsdfs.resize(count);
     batch.traits.resize(count);
     for (std::size_t s = 0; s < count; ++s) {
-        const std::span<const Closure> closures(batch.closures.closures.data() + batch.closures.first[s],
-                                                batch.closures.count[s]);
+        const std::span<const Closure> closures(
+            batch.closures.closures.data() + batch.closures.first[s], batch.closures.count[s]);
         float total = 0.0f;
         for (const Closure& closure : closures) {
             total += closure.sample_weight;
@@ -67,8 +70,8 @@ void make_bsdfs(PathBatch& batch) {
     }
 }
 
-// First hits give depth and normal; the first vertex that is not a mirror or pane gives the features
-// a denoiser wants.
+// First hits give depth and normal; the first vertex that is not a mirror or pane gives the
+// features a denoiser wants.
 void write_features(const RenderContext& context, PathBatch& batch) {
     for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
         const std::uint32_t path = batch.surface_path[s];

@@ -3,7 +3,9 @@
 
 namespace pharos {
 
-std::uint64_t generate_camera_rays(const RenderContext& context, const BatchWork& work, PathBatch& batch) {
+std::uint64_t generate_camera_rays(const RenderContext& context,
+                                   const BatchWork& work,
+                                   PathBatch& batch) {
     const FilmDescription& film = context.scene.description.film;
     batch.roots = work.pixels;
     batch.paths = work.pixels;
@@ -17,7 +19,8 @@ std::uint64_t generate_camera_rays(const RenderContext& context, const BatchWork
         const std::uint32_t hash = pixel_hash(context.settings().seed, x, y);
         const Vec4 u = sobol_4d(hash, work.sample, 0);
         const Vec2 offset = context.filter.sample(Vec2(u.x, u.y));
-        const Vec2 raster(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+        const Vec2 raster(static_cast<float>(x) + 0.5f + offset.x,
+                          static_cast<float>(y) + 0.5f + offset.y);
 
         batch.root_pixel[path] = pixel;
         batch.root_sample[path] = FilmSample{};

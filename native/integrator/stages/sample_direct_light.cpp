@@ -10,7 +10,9 @@ namespace {
 // Shadow rays end just before the light, so that an emissive surface does not shade itself.
 constexpr float kShadowEnd = 1.0f - 1e-4f;
 
-SurfaceInteraction point_on_emitter(const Scene& scene, const LightSamplerSample& light, const Ray& ray) {
+SurfaceInteraction point_on_emitter(const Scene& scene,
+                                    const LightSamplerSample& light,
+                                    const Ray& ray) {
     Hit hit;
     hit.t = light.sample.distance;
     hit.u = light.u;
@@ -32,7 +34,8 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
     const Bsdf& bsdf = batch.bsdfs[receiver.surface];
     const PathCounters& counters = batch.counters[receiver.path];
     const std::uint32_t set = 1u + 2u * counters.depth;
-    const Vec4 u = sobol_4d(batch.sampler_hash[receiver.path], batch.sample_index[receiver.path], set);
+    const Vec4 u =
+        sobol_4d(batch.sampler_hash[receiver.path], batch.sample_index[receiver.path], set);
     const LightSampleContext receiving{
         surface.p, surface.ns, batch.traits[receiver.surface].transmission_probability > 0.0f};
 
@@ -64,7 +67,8 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
         }
     } else if (light->instance != kNone) {
         L = Rgb(1.0f);
-        batch.pending_triangles.push_back({point_on_emitter(scene, *light, ray), sample.wi, shadow});
+        batch.pending_triangles.push_back(
+            {point_on_emitter(scene, *light, ray), sample.wi, shadow});
     }
     batch.shadow_rays.push_back({factor * L, receiver.path});
     if (!sample.cast_shadow) {
@@ -105,7 +109,11 @@ void evaluate_pending_worlds(const RenderContext& context, PathBatch& batch) {
         batch.pending_directions.push_back(pending.direction);
     }
     batch.pending_radiance.resize(batch.pending_directions.size());
-    evaluate_world(scene.world, scene.shading, batch.pending_directions, batch.scratch, batch.pending_radiance);
+    evaluate_world(scene.world,
+                   scene.shading,
+                   batch.pending_directions,
+                   batch.scratch,
+                   batch.pending_radiance);
     for (std::size_t i = 0; i < batch.pending_worlds.size(); ++i) {
         batch.shadow_rays[batch.pending_worlds[i].shadow].contribution *= batch.pending_radiance[i];
     }
@@ -124,7 +132,8 @@ std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch
     std::uint64_t items = 0;
     for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
         const std::uint32_t path = batch.surface_path[s];
-        const bool smooth = batch.bsdfs[s].total_sample_weight > 0.0f && batch.traits[s].delta_probability < 1.0f;
+        const bool smooth =
+            batch.bsdfs[s].total_sample_weight > 0.0f && batch.traits[s].delta_probability < 1.0f;
         if (smooth && !batch.counters[path].terminate_at_surface) {
             sample_light(context, {s, path}, batch);
             ++items;

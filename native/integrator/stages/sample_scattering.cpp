@@ -24,7 +24,8 @@ constexpr float kMinSurvival = 0.05f;
     return lobe & kLobeDiffuse ? kVisibleDiffuse : kVisibleGlossy;
 }
 
-// Counters after a scattering that is not straight transparency; sets the flag when a limit is reached.
+// Counters after a scattering that is not straight transparency; sets the flag when a limit is
+// reached.
 void count_bounce(const RenderSettings& settings, std::uint8_t lobe, PathCounters& counters) {
     ++counters.bounce;
     counters.from_camera = false;
@@ -41,7 +42,10 @@ void count_bounce(const RenderSettings& settings, std::uint8_t lobe, PathCounter
 }
 
 // The sampled direction as the path's next ray.
-void continue_path(const RenderContext& context, std::size_t s, const BsdfSample& sample, PathBatch& batch) {
+void continue_path(const RenderContext& context,
+                   std::size_t s,
+                   const BsdfSample& sample,
+                   PathBatch& batch) {
     const std::uint32_t path = batch.surface_path[s];
     const SurfaceInteraction& surface = batch.surfaces[s];
     PathCounters& counters = batch.counters[path];
@@ -58,7 +62,8 @@ void continue_path(const RenderContext& context, std::size_t s, const BsdfSample
     } else {
         count_bounce(context.settings(), sample.lobe, counters);
         batch.scatter_pdf[path] = sample.lobe & kLobeDelta ? 0.0f : sample.pdf;
-        batch.origin[path] = {surface.p, surface.ns, batch.traits[s].transmission_probability > 0.0f};
+        batch.origin[path] = {
+            surface.p, surface.ns, batch.traits[s].transmission_probability > 0.0f};
         batch.path_visibility[path] = visibility_after(sample.lobe);
         batch.next_visibility.push_back(batch.path_visibility[path]);
     }

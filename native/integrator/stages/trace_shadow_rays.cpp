@@ -20,8 +20,8 @@ void trace_opaque(const RenderContext& context, PathBatch& batch) {
     }
 }
 
-// One surface along each remaining shadow ray: contributions are multiplied by its transmittance and
-// the ray goes on behind it; opaque surfaces end it. Rays that leave add what they carry.
+// One surface along each remaining shadow ray: contributions are multiplied by its transmittance
+// and the ray goes on behind it; opaque surfaces end it. Rays that leave add what they carry.
 void pass_one_surface(const RenderContext& context, PathBatch& batch) {
     const Scene& scene = context.scene;
     std::size_t kept = 0;
@@ -38,8 +38,11 @@ void pass_one_surface(const RenderContext& context, PathBatch& batch) {
             continue;
         }
         Rgb transmittance(0.0f);
-        evaluate_transparency(
-            material, scene.shading, std::span(&surface, 1), batch.scratch, std::span(&transmittance, 1));
+        evaluate_transparency(material,
+                              scene.shading,
+                              std::span(&surface, 1),
+                              batch.scratch,
+                              std::span(&transmittance, 1));
         ShadowRay shadow = batch.shadow_rays[i];
         shadow.contribution *= transmittance;
         if (is_zero(shadow.contribution)) {

@@ -1,14 +1,15 @@
 #include "sampling/sampler.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 namespace pharos {
 namespace {
 
-// Owen-scrambled Sobol points of 2^k samples hit every elementary interval of each pair exactly once.
+// Owen-scrambled Sobol points of 2^k samples hit every elementary interval of each pair exactly
+// once.
 TEST(Sampler, FirstTwoDimensionsAreANet) {
     for (std::uint32_t hash : {1u, 77u, 123456u}) {
         for (int log_x = 0; log_x <= 8; ++log_x) {
