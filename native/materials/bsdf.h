@@ -1,11 +1,12 @@
 // THE scattering contract: a hit's closures and the three functions over them.
 //
 // wo points to the camera, wi is sampled; both unit, both pointing away from the surface.
-// eval_bsdf returns f * |cos(wi, n)| summed over all smooth closures and the pdf of wi per solid angle
-// of sample_bsdf's whole choice (closure choice included; delta closures take their share of the
-// probability but evaluate to zero). A delta sample returns weight and discrete probability instead.
-// Closure choice: probability proportional to sample_weight. Radiance crossing an interface is NOT
-// scaled by eta^2 (as Cycles). Transparent closures pass straight through and are delta.
+// eval_bsdf returns f * |cos(wi, n)| summed over all smooth closures and the pdf of wi per solid
+// angle of sample_bsdf's whole choice (closure choice included; delta closures take their share of
+// the probability but evaluate to zero). A delta sample returns weight and discrete probability
+// instead. Closure choice: probability proportional to sample_weight. Radiance crossing an
+// interface is NOT scaled by eta^2 (as Cycles). Transparent closures pass straight through and are
+// delta.
 #pragma once
 
 #include <array>
@@ -25,8 +26,8 @@ enum class ClosureType : std::uint8_t {
     Transparent,    // delta, straight on
     GgxReflection,  // includes conductors; singular when alpha_x * alpha_y <= 2e-10
     GgxRefraction,
-    GgxGlass,       // reflection and refraction with one half vector
-    Clearcoat,      // GTR1 (Principled v1)
+    GgxGlass,   // reflection and refraction with one half vector
+    Clearcoat,  // GTR1 (Principled v1)
     Sheen,
 };
 
@@ -44,17 +45,17 @@ struct Closure {
     float sample_weight = 0.0f;  // probability before normalisation; >= 0
     Vec3 n;                      // the closure's own shading normal
     float alpha_x = 0.0f;
-    Vec3 tangent;                // unit, for alpha_x != alpha_y
+    Vec3 tangent;  // unit, for alpha_x != alpha_y
     float alpha_y = 0.0f;
     Rgb f0{0.0f};
-    float eta = 1.0f;            // transmitted / incident index for wo's side
+    float eta = 1.0f;  // transmitted / incident index for wo's side
     Rgb f90{1.0f};
-    float energy_scale = 1.0f;   // multi-scatter compensation for wo, 1 where off
+    float energy_scale = 1.0f;  // multi-scatter compensation for wo, 1 where off
     Rgb transmission_tint{1.0f};
-    float parameter = 0.0f;      // Oren-Nayar sigma, Disney roughness, sheen roughness
+    float parameter = 0.0f;  // Oren-Nayar sigma, Disney roughness, sheen roughness
     ClosureType type = ClosureType::Diffuse;
     FresnelType fresnel = FresnelType::None;
-    std::uint8_t smith = 0;      // 0: height-correlated (Blender 4.x), 1: separable (3.x)
+    std::uint8_t smith = 0;  // 0: height-correlated (Blender 4.x), 1: separable (3.x)
 };
 
 inline constexpr int kMaxClosures = 12;  // per hit; the least important are dropped and counted
@@ -81,24 +82,26 @@ struct BsdfEval {
 };
 
 struct BsdfSample {
-    Rgb f_cos{0.0f};   // delta: f_cos / pdf is the throughput factor
+    Rgb f_cos{0.0f};  // delta: f_cos / pdf is the throughput factor
     Vec3 wi;
     float pdf = 0.0f;  // solid angle; delta: discrete probability
     std::uint8_t lobe = 0;
-    float eta = 1.0f;  // of a transmission, else 1
+    float eta = 1.0f;        // of a transmission, else 1
     float roughness = 1.0f;  // sqrt(alpha) of the sampled lobe, 1 for diffuse
 };
 
 // What sampling may rely on, found once per hit.
 struct BsdfTraits {
-    float delta_probability = 0.0f;        // share of the closure choice that is delta
-    float transmission_probability = 0.0f; // share of smooth lobes reaching the far hemisphere
-    float min_alpha = 1.0f;                // of the smooth reflecting lobes; 1 for diffuse alone
-    Rgb albedo{0.0f};                      // estimate of the directional albedo, for roulette
+    float delta_probability = 0.0f;         // share of the closure choice that is delta
+    float transmission_probability = 0.0f;  // share of smooth lobes reaching the far hemisphere
+    float min_alpha = 1.0f;                 // of the smooth reflecting lobes; 1 for diffuse alone
+    Rgb albedo{0.0f};                       // estimate of the directional albedo, for roulette
 };
 
 [[nodiscard]] BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi);
-[[nodiscard]] std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, float u_closure, const Vec2& u);
+[[nodiscard]] std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf,
+                                                    float u_closure,
+                                                    const Vec2& u);
 [[nodiscard]] BsdfTraits bsdf_traits(const Bsdf& bsdf);
 
 }  // namespace pharos

@@ -1,0 +1,270 @@
+// The dispatch over closures: one switch a function, no virtual calls, lobes inlined.
+//
+// A direction on different sides of ng and of a closure's shading normal can not be sampled
+// (rejected, as in Cycles), so it adds to f but not to the pdf: next-event estimation then weighs
+// it fully.
+#include "materials/bsdf.h"
+
+#include "core/color.h"
+#include "materials/closure_albedo.h"
+#include "materials/fresnel.h"
+#include "materials/lobes/clearcoat.h"
+#include "materials/lobes/diffuse.h"
+#include "materials/lobes/ggx.h"
+#include "materials/lobes/sheen.h"
+#include "materials/microfacet.h"
+#include "sampling/warps.h"
+
+namespace pharos {
+
+namespace {
+
+[[nodiscard]] inline BsdfEval eval_closure(const Closure& c, const Vec3& wo, const Vec3& wi) {
+    switch (c.type) {
+        case ClosureType::Diffuse:
+            return eval_lambert(c, wi);
+        case ClosureType::OrenNayar:
+            return eval_oren_nayar(c, wo, wi);
+        case ClosureType::DisneyDiffuse:
+            return eval_disney_diffuse(c, wo, wi);
+        case ClosureType::Translucent:
+            return eval_translucent(c, wi);
+        case ClosureType::Transparent:
+            return {};
+        case ClosureType::GgxReflection:
+            return eval_ggx_reflection(c, wo, wi);
+        case ClosureType::GgxRefraction:
+        case ClosureType::GgxGlass:
+            return eval_ggx_glass(c, wo, wi);
+        case ClosureType::Clearcoat:
+            return eval_clearcoat(c, wo, wi);
+        case ClosureType::Sheen:
+            return c.smith != 0 ? eval_sheen_v1(c, wo, wi) : eval_sheen_ltc(c, wi);
+    }
+    return {};
+}
+
+// Direction of a smooth closure; u_branch is a random number of its own for glass.
+[[nodiscard]] inline std::optional<Vec3> sample_direction(const Closure& c,
+                                                          const Vec3& wo,
+                                                          float u_branch,
+                                                          const Vec2& u) {
+    switch (c.type) {
+        case ClosureType::GgxReflection:
+            return sample_ggx_reflection(c, wo, u);
+        case ClosureType::GgxRefraction:
+        case ClosureType::GgxGlass:
+            return sample_ggx_glass(c, wo, u_branch, u);
+        case ClosureType::Clearcoat: {
+            const Vec3 h = Frame::from_z(c.n).to_world(sample_gtr1(c.alpha_x, u));
+            return glm::normalize(h * (2.0f * glm::dot(wo, h)) - wo);
+        }
+        case ClosureType::Sheen:
+            if (c.smith == 0) {
+                return sample_sheen_ltc(c, u);
+            }
+            break;
+        case ClosureType::Translucent:
+            return Frame::from_z(-c.n).to_world(sample_cosine_hemisphere(u));
+        default:
+            break;
+    }
+    return Frame::from_z(c.n).to_world(sample_cosine_hemisphere(u));
+}
+
+[[nodiscard]] inline std::uint8_t lobe_bits(const Closure& c, bool transmitted) {
+    switch (c.type) {
+        case ClosureType::GgxReflection:
+        case ClosureType::GgxRefraction:
+        case ClosureType::GgxGlass:
+        case ClosureType::Clearcoat:
+            return transmitted ? kLobeGlossy | kLobeTransmission : kLobeGlossy;
+        case ClosureType::Translucent:
+            return kLobeDiffuse | kLobeTransmission;
+        default:
+            return kLobeDiffuse;
+    }
+}
+
+[[nodiscard]] inline float lobe_roughness(const Closure& c) {
+    switch (c.type) {
+        case ClosureType::GgxReflection:
+        case ClosureType::GgxRefraction:
+        case ClosureType::GgxGlass:
+            return std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
+        case ClosureType::Clearcoat:
+            return std::sqrt(c.alpha_x);
+        default:
+            return 1.0f;
+    }
+}
+
+// A delta closure chosen with probability `share`.
+[[nodiscard]] std::optional<BsdfSample> sample_delta(const Closure& c,
+                                                     const Bsdf& bsdf,
+                                                     float share,
+                                                     float u_branch) {
+    BsdfSample s;
+    s.roughness = 0.0f;
+    if (c.type == ClosureType::Transparent) {
+        s.wi = -bsdf.wo;
+        s.pdf = share;
+        s.f_cos = c.weight * share;
+        s.lobe = kLobeDelta | kLobeTransparent;
+        return s;
+    }
+    const float zo = glm::dot(c.n, bsdf.wo);
+    if (!(zo > 0.0f)) {
+        return std::nullopt;
+    }
+    const bool glass = c.type != ClosureType::GgxReflection;
+    const FresnelSplit split =
+        glass ? closure_fresnel_split(c, zo) : FresnelSplit{closure_reflectance(c, zo), Rgb(0.0f)};
+    const float reflect = glass ? detail::reflect_probability(split) : 1.0f;
+    if (u_branch < reflect) {
+        s.wi = glm::normalize(c.n * (2.0f * zo) - bsdf.wo);
+        s.pdf = share * reflect;
+        s.f_cos = c.weight * split.reflected * (c.energy_scale * share);
+        s.lobe = kLobeDelta;
+    } else {
+        const float cosine = refracted_cosine(zo, c.eta);
+        if (cosine < 0.0f) {
+            return std::nullopt;
+        }
+        s.wi = glm::normalize(c.n * (zo / c.eta - cosine) - bsdf.wo * (1.0f / c.eta));
+        s.pdf = share * (1.0f - reflect);
+        s.f_cos = c.weight * split.transmitted * (c.energy_scale * share);
+        s.lobe = kLobeDelta | kLobeTransmission;
+        s.eta = c.eta;
+    }
+    const bool in_front = glm::dot(s.wi, bsdf.ng) > 0.0f;
+    if (in_front != (s.lobe == kLobeDelta) || !(s.pdf > 0.0f)) {
+        return std::nullopt;
+    }
+    return s;
+}
+
+[[nodiscard]] inline std::optional<BsdfSample> sample_single_diffuse(const Bsdf& bsdf,
+                                                                     const Vec2& u) {
+    const Closure& c = bsdf.closures[0];
+    BsdfSample s;
+    s.wi = Frame::from_z(c.n).to_world(sample_cosine_hemisphere(u));
+    const BsdfEval e = eval_lambert(c, s.wi);
+    if (!(glm::dot(s.wi, bsdf.ng) > 0.0f) || !(e.pdf > 0.0f)) {
+        return std::nullopt;
+    }
+    s.f_cos = e.f_cos;
+    s.pdf = e.pdf;
+    s.lobe = kLobeDiffuse;
+    return s;
+}
+
+}  // namespace
+
+BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi) {
+    const bool in_front = glm::dot(wi, bsdf.ng) > 0.0f;
+    if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
+        BsdfEval e = eval_lambert(bsdf.closures[0], wi);
+        e.pdf = in_front ? e.pdf : 0.0f;
+        return e;
+    }
+    BsdfEval sum;
+    for (const Closure& c : bsdf.closures) {
+        if (is_delta(c)) {
+            continue;
+        }
+        const BsdfEval e = eval_closure(c, bsdf.wo, wi);
+        sum.f_cos += e.f_cos;
+        if ((glm::dot(c.n, wi) > 0.0f) == in_front) {
+            sum.pdf += c.sample_weight * e.pdf;
+        }
+    }
+    sum.pdf = bsdf.total_sample_weight > 0.0f ? sum.pdf / bsdf.total_sample_weight : 0.0f;
+    return sum;
+}
+
+std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, float u_closure, const Vec2& u) {
+    if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
+        return sample_single_diffuse(bsdf, u);
+    }
+    // Choose a closure; what is left of u_closure within its interval is a fresh random number.
+    const Closure* chosen = nullptr;
+    float remaining = u_closure * bsdf.total_sample_weight;
+    float u_branch = 0.0f;
+    for (const Closure& c : bsdf.closures) {
+        if (!(c.sample_weight > 0.0f)) {
+            continue;
+        }
+        chosen = &c;
+        u_branch = std::min(remaining / c.sample_weight, kOneMinusEpsilon);
+        if (remaining < c.sample_weight) {
+            break;
+        }
+        remaining -= c.sample_weight;
+    }
+    if (chosen == nullptr) {
+        return std::nullopt;
+    }
+    if (is_delta(*chosen)) {
+        return sample_delta(
+            *chosen, bsdf, chosen->sample_weight / bsdf.total_sample_weight, u_branch);
+    }
+    const std::optional<Vec3> wi = sample_direction(*chosen, bsdf.wo, u_branch, u);
+    if (!wi) {
+        return std::nullopt;
+    }
+    // The lobe must send the direction to the same side of the shading and the geometric surface.
+    const bool above = glm::dot(chosen->n, *wi) > 0.0f;
+    const bool transmits = chosen->type == ClosureType::Translucent ||
+                           chosen->type == ClosureType::GgxRefraction ||
+                           (chosen->type == ClosureType::GgxGlass && !above);
+    if (above == transmits || above != (glm::dot(*wi, bsdf.ng) > 0.0f)) {
+        return std::nullopt;
+    }
+    const BsdfEval e = eval_bsdf(bsdf, *wi);
+    if (!(e.pdf > 0.0f)) {
+        return std::nullopt;
+    }
+    BsdfSample s;
+    s.f_cos = e.f_cos;
+    s.wi = *wi;
+    s.pdf = e.pdf;
+    s.lobe = lobe_bits(*chosen, transmits);
+    s.eta = transmits && chosen->type != ClosureType::Translucent ? chosen->eta : 1.0f;
+    s.roughness = lobe_roughness(*chosen);
+    return s;
+}
+
+BsdfTraits bsdf_traits(const Bsdf& bsdf) {
+    BsdfTraits traits;
+    if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
+        traits.albedo = bsdf.closures[0].weight;
+        return traits;
+    }
+    float delta = 0.0f;
+    float smooth = 0.0f;
+    float transmitted = 0.0f;
+    for (const Closure& c : bsdf.closures) {
+        const ClosureAlbedo albedo = closure_albedo(c, bsdf.wo);
+        traits.albedo += albedo.reflected + albedo.transmitted;
+        if (is_delta(c)) {
+            delta += c.sample_weight;
+            continue;
+        }
+        smooth += c.sample_weight;
+        const float through = average(albedo.transmitted);
+        const float sum = average(albedo.reflected) + through;
+        transmitted += sum > 0.0f ? c.sample_weight * (through / sum) : 0.0f;
+        if (c.type == ClosureType::GgxReflection || c.type == ClosureType::GgxGlass) {
+            traits.min_alpha = std::min(traits.min_alpha, std::min(c.alpha_x, c.alpha_y));
+        } else if (c.type == ClosureType::Clearcoat) {
+            traits.min_alpha = std::min(traits.min_alpha, c.alpha_x);
+        }
+    }
+    traits.delta_probability =
+        bsdf.total_sample_weight > 0.0f ? delta / bsdf.total_sample_weight : 0.0f;
+    traits.transmission_probability = smooth > 0.0f ? transmitted / smooth : 0.0f;
+    return traits;
+}
+
+}  // namespace pharos
