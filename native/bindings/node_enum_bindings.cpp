@@ -144,7 +144,8 @@ void bind_modes(py::module_& m) {
     }
     {
         using E = ColorModel;
-        m.attr("ColorModel") = numbers<E>({{"Rgb", E::Rgb}, {"Hsv", E::Hsv}, {"Hsl", E::Hsl}});
+        m.attr("ColorModel") =
+            numbers<E>({{"Rgb", E::RedGreenBlue}, {"Hsv", E::Hsv}, {"Hsl", E::Hsl}});
     }
     {
         using E = MapRangeMode;

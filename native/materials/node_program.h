@@ -121,7 +121,7 @@ enum class LightPathOutput : std::uint16_t {
 enum class Distribution : std::uint16_t { Sharp, Beckmann, Ggx, MultiGgx, AshikhminShirley };
 enum class MappingMode : std::uint16_t { Point, Texture, Vector, Normal };
 enum class NormalMapSpace : std::uint16_t { Tangent, Object, World };
-enum class ColorModel : std::uint16_t { Rgb, Hsv, Hsl };
+enum class ColorModel : std::uint16_t { RedGreenBlue, Hsv, Hsl };
 enum class MapRangeMode : std::uint16_t { Linear, Stepped, SmoothStep, SmootherStep };
 enum class VectorRotateMode : std::uint16_t { AxisAngle, XAxis, YAxis, ZAxis, EulerXyz };
 enum class GradientMode : std::uint16_t {
