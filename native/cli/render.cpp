@@ -1,0 +1,286 @@
+// pharos-cli render: a dump file to an EXR, with the statistics benchmarks read.
+#include <cctype>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <optional>
+
+#include "cli/commands.h"
+#include "image/image_io.h"
+#include "scene/dump.h"
+#include "session/render_session.h"
+
+namespace pharos::cli {
+
+namespace {
+
+volatile std::sig_atomic_t received_signal = 0;
+
+extern "C" void remember_signal(int signal) {
+    received_signal = signal;
+}
+
+struct Options {
+    std::string input;
+    std::string output;
+    std::optional<std::uint32_t> samples;
+    std::optional<std::uint32_t> seed;
+    std::optional<float> time_limit;
+    std::optional<bool> nee;
+    std::optional<GuidingMode> guiding;
+    unsigned threads = 0;
+    std::vector<std::uint32_t> snapshots;
+    bool stats = false;
+    std::string stats_json;
+};
+
+template <class T>
+T parse_number(const std::string& name, const std::string& text) {
+    T value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size()) {
+        throw UsageError(name + ": '" + text + "' is not a number");
+    }
+    return value;
+}
+
+GuidingMode parse_guiding(const std::string& text) {
+    std::string lower = text;
+    for (char& c : lower) {
+        c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    if (lower == "off") {
+        return GuidingMode::Off;
+    }
+    if (lower == "neural") {
+        return GuidingMode::Neural;
+    }
+    if (lower == "slides") {
+        return GuidingMode::Slides;
+    }
+    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides");
+}
+
+std::vector<std::uint32_t> parse_list(const std::string& name, const std::string& text) {
+    std::vector<std::uint32_t> values;
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        values.push_back(parse_number<std::uint32_t>(name, text.substr(begin, end - begin)));
+        begin = end + 1;
+    }
+    return values;
+}
+
+void parse_option(const std::string& name, const std::string& value, Options& options) {
+    if (name == "-o" || name == "--output") {
+        options.output = value;
+    } else if (name == "--samples") {
+        options.samples = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--seed") {
+        options.seed = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--threads") {
+        options.threads = parse_number<unsigned>(name, value);
+    } else if (name == "--time-limit") {
+        options.time_limit = parse_number<float>(name, value);
+    } else if (name == "--guiding") {
+        options.guiding = parse_guiding(value);
+    } else if (name == "--nee") {
+        if (value != "on" && value != "off") {
+            throw UsageError("--nee: '" + value + "' is neither on nor off");
+        }
+        options.nee = value == "on";
+    } else if (name == "--snapshots") {
+        options.snapshots = parse_list(name, value);
+    } else if (name == "--stats-json") {
+        options.stats_json = value;
+    } else {
+        throw UsageError("unknown option '" + name + "'");
+    }
+}
+
+Options parse(const std::vector<std::string>& arguments) {
+    Options options;
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+        const std::string& argument = arguments[i];
+        if (argument == "--stats") {
+            options.stats = true;
+        } else if (argument.starts_with("-")) {
+            if (i + 1 == arguments.size()) {
+                throw UsageError(argument + " needs a value");
+            }
+            parse_option(argument, arguments[++i], options);
+        } else if (options.input.empty()) {
+            options.input = argument;
+        } else {
+            throw UsageError("one input file only, not also '" + argument + "'");
+        }
+    }
+    if (options.input.empty() || options.output.empty()) {
+        throw UsageError("render needs an input file and -o");
+    }
+    return options;
+}
+
+void apply(const Options& options, RenderSettings& settings) {
+    settings.samples = options.samples.value_or(settings.samples);
+    settings.seed = options.seed.value_or(settings.seed);
+    settings.time_limit = options.time_limit.value_or(settings.time_limit);
+    settings.use_nee = options.nee.value_or(settings.use_nee);
+    settings.guiding = options.guiding.value_or(settings.guiding);
+}
+
+// OUT.exr -> OUT.64.exr
+std::string snapshot_path(const std::string& output, std::uint32_t samples) {
+    const std::size_t dot = output.ends_with(".exr") ? output.size() - 4 : output.size();
+    return output.substr(0, dot) + "." + std::to_string(samples) + output.substr(dot);
+}
+
+void write_picture(const RenderSession& session, const std::string& path) {
+    struct Output {
+        FilmPass pass;
+        const char* name;
+        const char* channels;
+    };
+
+    constexpr Output kOutputs[] = {{FilmPass::Combined, "Combined", "RGBA"},
+                                   {FilmPass::Depth, "Depth", "Z"},
+                                   {FilmPass::Normal, "Normal", "XYZ"},
+                                   {FilmPass::DenoisingAlbedo, "Denoising Albedo", "RGB"},
+                                   {FilmPass::DenoisingNormal, "Denoising Normal", "XYZ"}};
+    const std::size_t pixels = std::size_t{session.width()} * session.height();
+    std::vector<std::vector<float>> buffers;
+    std::vector<ExrPass> passes;
+    for (const Output& output : kOutputs) {
+        auto& buffer = buffers.emplace_back(
+            pixels * static_cast<std::size_t>(film_pass_channels(output.pass)));
+        if (!session.read(output.pass, buffer)) {
+            throw std::runtime_error("there is no picture to write");
+        }
+        passes.push_back({output.name, output.channels, buffer});
+    }
+    const ExrOptions options{
+        false,
+        {{"pharos:samples", std::to_string(session.progress().samples)}, {"Software", "Pharos"}}};
+    if (const std::string error =
+            write_exr(path, session.width(), session.height(), passes, options);
+        !error.empty()) {
+        throw std::runtime_error(error);
+    }
+}
+
+void print_statistics(const RenderSession& session) {
+    const SessionStatistics statistics = session.statistics();
+    double total = 0.0;
+    for (const StageStatistics& stage : statistics.stages) {
+        total += stage.seconds;
+    }
+    std::printf("%-22s %14s %10s %7s\n", "stage", "items", "ns/item", "share");
+    for (const StageStatistics& stage : statistics.stages) {
+        const double items = static_cast<double>(stage.items);
+        std::printf("%-22s %14llu %10.1f %6.2f%%\n",
+                    stage.name.c_str(),
+                    static_cast<unsigned long long>(stage.items),
+                    stage.items > 0 ? 1e9 * stage.seconds / items : 0.0,
+                    total > 0.0 ? 100.0 * stage.seconds / total : 0.0);
+    }
+    const double samples = static_cast<double>(statistics.camera_samples);
+    const double cpu = statistics.render_cpu_seconds;
+    std::printf("samples %.0f, vertices a sample %.2f, rays a sample %.2f\n",
+                samples,
+                static_cast<double>(statistics.vertices) / samples,
+                static_cast<double>(statistics.rays) / samples);
+    std::printf("build %.3f s, CPU %.3f s, %.3f M samples and %.3f M rays a CPU second\n",
+                statistics.build_seconds,
+                cpu,
+                1e-6 * samples / cpu,
+                1e-6 * static_cast<double>(statistics.rays) / cpu);
+    const SessionProgress progress = session.progress();
+    std::printf("memory %.1f MiB, dropped non-finite samples %llu\n",
+                static_cast<double>(progress.memory_bytes) / 1048576.0,
+                static_cast<unsigned long long>(progress.nonfinite_samples));
+}
+
+void write_statistics_json(const RenderSession& session, const std::string& path) {
+    const SessionStatistics statistics = session.statistics();
+    std::ofstream out(path);
+    out.precision(9);
+    out << "{\n  \"camera_samples\": " << statistics.camera_samples
+        << ",\n  \"vertices\": " << statistics.vertices << ",\n  \"rays\": " << statistics.rays
+        << ",\n  \"build_seconds\": " << statistics.build_seconds
+        << ",\n  \"render_cpu_seconds\": " << statistics.render_cpu_seconds
+        << ",\n  \"nonfinite_samples\": " << session.progress().nonfinite_samples
+        << ",\n  \"memory_bytes\": " << session.progress().memory_bytes << ",\n  \"stages\": [";
+    for (const StageStatistics& stage : statistics.stages) {
+        out << (&stage == statistics.stages.data() ? "\n" : ",\n") << "    {\"name\": \""
+            << stage.name << "\", \"items\": " << stage.items << ", \"seconds\": " << stage.seconds
+            << "}";
+    }
+    out << "\n  ],\n  \"snapshots\": [";
+    const auto snapshots = session.snapshots();
+    for (const SessionSnapshot& snapshot : snapshots) {
+        out << (&snapshot == snapshots.data() ? "\n" : ",\n")
+            << "    {\"samples\": " << snapshot.samples
+            << ", \"cpu_seconds\": " << snapshot.cpu_seconds << "}";
+    }
+    out << "\n  ]\n}\n";
+    if (!out.flush()) {
+        throw std::runtime_error(path + ": cannot be written");
+    }
+}
+
+void write_snapshots(const RenderSession& session, const std::string& output) {
+    for (const SessionSnapshot& snapshot : session.snapshots()) {
+        const ExrPass pass{"Combined", "RGBA", snapshot.combined};
+        const std::string path = snapshot_path(output, snapshot.samples);
+        const std::string error =
+            write_exr(path, session.width(), session.height(), std::span(&pass, 1), {});
+        if (!error.empty()) {
+            throw std::runtime_error(error);
+        }
+    }
+}
+
+// Waits for the end; a signal cancels. Returns the exit code of a render that has a picture.
+int wait_for_end(RenderSession& session) {
+    std::signal(SIGINT, remember_signal);
+    std::signal(SIGTERM, remember_signal);
+    while (!session.wait(std::chrono::milliseconds(50))) {
+        if (received_signal != 0) {
+            session.cancel();
+        }
+    }
+    if (received_signal == SIGINT) {
+        return 130;
+    }
+    return received_signal == SIGTERM ? 143 : 0;
+}
+
+}  // namespace
+
+int render(const std::vector<std::string>& arguments) {
+    const Options options = parse(arguments);
+    SceneDescription description = read_dump(options.input);
+    apply(options, description.settings);
+    RenderSession session(std::move(description), options.threads, options.snapshots);
+    const int code = wait_for_end(session);
+    for (const ReportEntry& entry : session.report()) {
+        std::fprintf(stderr, "pharos-cli: %s: %s\n", entry.object.c_str(), entry.message.c_str());
+    }
+    const SessionProgress progress = session.progress();
+    if (progress.state == SessionState::Failed) {
+        throw std::runtime_error(progress.error);
+    }
+    write_picture(session, options.output);
+    write_snapshots(session, options.output);
+    if (options.stats) {
+        print_statistics(session);
+    }
+    if (!options.stats_json.empty()) {
+        write_statistics_json(session, options.stats_json);
+    }
+    return code;
+}
+
+}  // namespace pharos::cli
