@@ -1,0 +1,331 @@
+#include "geometry/accelerator.h"
+
+#include <chrono>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <xmmintrin.h>
+
+#include "random_scene.h"
+#include "support/description_builders.h"
+
+namespace pharos::testing {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct ExactHit {
+    double t = std::numeric_limits<double>::infinity();
+    double edge = 1.0;  // smallest barycentric: small ones may go either way in float
+    std::uint32_t instance = kNone;
+    std::uint32_t triangle = kNone;
+};
+
+// Moeller and Trumbore's test in double on world-space triangles, all of them.
+ExactHit brute_force(const TestGeometry& scene, const Ray& ray) {
+    ExactHit best;
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
+        const glm::dmat4 m(scene.instances[i].to_world);
+        const auto corner = [&](std::uint32_t index) {
+            return glm::dvec3(m * glm::dvec4(glm::dvec3(mesh.positions[index]), 1.0));
+        };
+        for (std::uint32_t k = 0; k < mesh.triangles.size(); ++k) {
+            const UVec3& t = mesh.triangles[k];
+            const glm::dvec3 p0 = corner(t.x);
+            const glm::dvec3 e1 = corner(t.y) - p0;
+            const glm::dvec3 e2 = corner(t.z) - p0;
+            const glm::dvec3 d(ray.direction);
+            const glm::dvec3 s = glm::dvec3(ray.origin) - p0;
+            const glm::dvec3 h = glm::cross(d, e2);
+            const glm::dvec3 q = glm::cross(s, e1);
+            const double a = glm::dot(e1, h);
+            const double u = glm::dot(s, h) / a;
+            const double v = glm::dot(d, q) / a;
+            const double distance = glm::dot(e2, q) / a;
+            if (u >= 0 && v >= 0 && u + v <= 1 && distance > 0 && distance < best.t) {
+                best = {distance, std::min(std::min(u, v), 1 - u - v), i, k};
+            }
+        }
+    }
+    return best;
+}
+
+TEST(Accelerator, HitsAreThoseOfBruteForce) {
+    Random random(1);
+    TestGeometry scene;
+    scene.meshes.push_back(random_triangles(random, 60, 1.0f, 0.5f));
+    scene.meshes.push_back(random_triangles(random, 60, 1.0f, 0.5f));
+    scene.instances.push_back(make_instance(0, random.affine(2.0f)));
+    for (int i = 0; i < 4; ++i) {
+        scene.instances.push_back(make_instance(1, random.affine(3.0f)));
+    }
+    scene.build();
+    std::size_t compared = 0;
+    for (int i = 0; i < 4000; ++i) {
+        const Vec3 origin = random.in_box(6.0f);
+        const Ray ray{origin, glm::normalize(random.in_box(2.0f) - origin)};
+        const ExactHit exact = brute_force(scene, ray);
+        const Hit hit = scene.trace(ray);
+        if (exact.instance == kNone || exact.edge < 1e-5) {
+            continue;
+        }
+        ++compared;
+        ASSERT_EQ(hit.instance, exact.instance) << "ray " << i;
+        ASSERT_EQ(hit.triangle, exact.triangle) << "ray " << i;
+        ASSERT_NEAR(static_cast<double>(hit.t), exact.t, 2e-5);
+        std::uint8_t occluded = 0;
+        const Ray shorter{ray.origin, ray.direction, 0.0f, hit.t * 0.999f};
+        scene.accelerator->occluded(std::span(&ray, 1), std::span(&occluded, 1));
+        ASSERT_EQ(occluded, 1);
+        scene.accelerator->occluded(std::span(&shorter, 1), std::span(&occluded, 1));
+        ASSERT_EQ(occluded, 0);
+    }
+    EXPECT_GT(compared, 1500u);
+}
+
+TEST(Accelerator, BarycentricsGiveTheHitPoint) {
+    Random random(2);
+    TestGeometry scene;
+    scene.meshes.push_back(random_triangles(random, 200, 1.0f, 0.5f));
+    scene.instances.push_back(make_instance(0, random.affine(1.0f)));
+    scene.instances.push_back(make_instance(0, random.affine(1.0f)));
+    scene.build();
+    for (int i = 0; i < 2000; ++i) {
+        const Ray ray{random.in_box(5.0f), random.direction()};
+        const Hit hit = scene.trace(ray);
+        if (hit.instance == kNone) {
+            EXPECT_EQ(hit.t, kInfinity);
+            continue;
+        }
+        const Vec3 p = scene.interaction(ray, hit).p;
+        ASSERT_LT(glm::length(p - (ray.origin + ray.direction * hit.t)), 1e-4f);
+    }
+}
+
+TEST(Accelerator, RespectsTheInterval) {
+    TestGeometry scene;
+    scene.meshes.push_back(quad_mesh("q", Vec3(-1, -1, 0), Vec3(2, 0, 0), Vec3(0, 2, 0)));
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    scene.build();
+    const Vec3 origin(0.1f, 0.2f, 3.0f);
+    const Vec3 down(0, 0, -1);
+    EXPECT_FLOAT_EQ(scene.trace(Ray{origin, down}).t, 3.0f);
+    EXPECT_EQ(scene.trace(Ray{origin, down, 3.1f}).instance, kNone);
+    EXPECT_EQ(scene.trace(Ray{origin, down, 0.0f, 2.9f}).instance, kNone);
+    EXPECT_EQ(scene.trace(Ray{origin, down, 0.0f, 3.1f}).instance, 0u);
+    EXPECT_EQ(scene.trace(Ray{origin, down, 4.0f, 1.0f}).instance, kNone);
+    EXPECT_EQ(scene.trace(Ray{origin, -down}).instance, kNone);
+}
+
+TEST(Accelerator, NonFiniteRaysMiss) {
+    TestGeometry scene;
+    scene.meshes.push_back(box_mesh("box", Vec3(-1), Vec3(1)));
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    scene.build();
+    const Ray good{Vec3(0.1f, 0.2f, 0.3f), glm::normalize(Vec3(1, 2, 3))};
+    ASSERT_EQ(scene.trace(good).instance, 0u);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    for (const float bad : {nan, kInfinity, -kInfinity}) {
+        for (int member = 0; member < 8; ++member) {
+            Ray ray = good;
+            float* values[] = {&ray.origin.x,
+                               &ray.origin.y,
+                               &ray.origin.z,
+                               &ray.direction.x,
+                               &ray.direction.y,
+                               &ray.direction.z,
+                               &ray.t_min,
+                               &ray.t_max};
+            if (values[member] == &ray.t_max && bad > 0.0f) {
+                continue;  // no far end
+            }
+            if (values[member] == &ray.t_min && bad < 0.0f) {
+                continue;
+            }
+            *values[member] = bad;
+            EXPECT_EQ(scene.trace(ray).instance, kNone) << "member " << member << " " << bad;
+            std::uint8_t occluded = 7;
+            scene.accelerator->occluded(std::span(&ray, 1), std::span(&occluded, 1));
+            EXPECT_EQ(occluded, 0) << "member " << member << " " << bad;
+        }
+    }
+    Ray standing = good;
+    standing.direction = Vec3(0.0f);
+    const Hit hit = scene.trace(standing);
+    EXPECT_TRUE(hit.instance == kNone || hit.instance == 0u);
+}
+
+TEST(Accelerator, BrokenTrianglesAreHarmless) {
+    TestGeometry scene;
+    Mesh mesh = box_mesh("box", Vec3(-1), Vec3(1));
+    const auto corner = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.emplace_back(0.5f);
+    mesh.positions.emplace_back(std::numeric_limits<float>::quiet_NaN());
+    mesh.positions.emplace_back(kInfinity);
+    mesh.positions.emplace_back(3e38f);
+    mesh.triangles.emplace_back(corner, corner, corner);  // a point
+    mesh.triangles.emplace_back(0, 1, 1);                 // a line
+    mesh.triangles.emplace_back(0, 1, corner + 1);
+    mesh.triangles.emplace_back(0, 1, corner + 2);
+    mesh.triangles.emplace_back(0, 1, corner + 3);
+    mesh.triangles.emplace_back(0, 1, 1000000);
+    scene.meshes.push_back(std::move(mesh));
+    for (int i = 0; i < 2; ++i) {
+        scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+        scene.build();
+        Random random(4);
+        for (int k = 0; k < 1000; ++k) {
+            const Ray ray{random.in_box(0.4f), random.direction()};
+            const Hit hit = scene.trace(ray);
+            ASSERT_LT(hit.triangle, 12u);
+            ASSERT_TRUE(std::isfinite(hit.t));
+        }
+    }
+}
+
+TEST(Accelerator, NothingToHit) {
+    TestGeometry none;
+    none.build();
+    EXPECT_EQ(none.trace(Ray{Vec3(0), Vec3(0, 0, 1)}).instance, kNone);
+    EXPECT_TRUE(none.accelerator->bounds().empty());
+
+    TestGeometry hollow;
+    hollow.meshes.resize(2);
+    hollow.meshes[1].positions.emplace_back(1.0f);
+    for (const std::uint32_t mesh : {0u, 0u, 1u}) {
+        hollow.instances.push_back(make_instance(mesh, Mat4(1.0f)));
+    }
+    hollow.build();
+    EXPECT_EQ(hollow.trace(Ray{Vec3(0), Vec3(0, 0, 1)}).instance, kNone);
+}
+
+TEST(Accelerator, VisibilityHidesInstances) {
+    for (const bool shared : {false, true}) {
+        TestGeometry scene;
+        for (std::uint32_t i = 0; i < 3; ++i) {
+            const Mat4 down = glm::translate(Mat4(1.0f), Vec3(0, 0, -1.0f - static_cast<float>(i)));
+            if (!shared || i == 0) {
+                scene.meshes.push_back(
+                    quad_mesh("q", Vec3(-1, -1, 0), Vec3(2, 0, 0), Vec3(0, 2, 0)));
+            }
+            scene.instances.push_back(make_instance(shared ? 0 : i, down));
+        }
+        scene.instances[0].visibility = kVisibleGlossy | kVisibleDiffuse;
+        scene.instances[1].visibility = kVisibleGlossy | kVisibleShadow;
+        scene.instances[2].visibility = kVisibleAll & ~kVisibleShadow;
+        scene.build();
+        const Ray ray{Vec3(0.3f, 0.2f, 0.0f), Vec3(0, 0, -1)};
+        EXPECT_EQ(scene.trace(ray, kVisibleCamera).instance, 2u);
+        EXPECT_EQ(scene.trace(ray, kVisibleGlossy).instance, 0u);
+        EXPECT_EQ(scene.trace(ray, kVisibleTransmission).instance, 2u);
+        EXPECT_EQ(scene.trace(ray, kVisibleShadow).instance, 1u);
+        EXPECT_EQ(scene.trace(ray, 0).instance, kNone);
+        const std::vector<Ray> rays = {
+            ray, {ray.origin, ray.direction, 0.0f, 1.5f}, {ray.origin, ray.direction, 2.5f, 9.0f}};
+        std::vector<std::uint8_t> occluded(3);
+        scene.accelerator->occluded(rays, occluded);
+        EXPECT_EQ(occluded, (std::vector<std::uint8_t>{1, 0, 0}));
+    }
+}
+
+TEST(Accelerator, BoundsAndBytes) {
+    TestGeometry scene;
+    scene.meshes.push_back(box_mesh("box", Vec3(-1, -2, -3), Vec3(1, 2, 3)));
+    scene.instances.push_back(make_instance(0, glm::translate(Mat4(1.0f), Vec3(10, 0, 0))));
+    scene.build();
+    const Bounds3 b = scene.accelerator->bounds();
+    EXPECT_LT(glm::length(b.lower - Vec3(9, -2, -3)), 1e-4f);
+    EXPECT_LT(glm::length(b.upper - Vec3(11, 2, 3)), 1e-4f);
+    const std::uint64_t small = scene.accelerator->bytes();
+    EXPECT_GT(small, 0u);
+    Random random(1);
+    scene.meshes[0] = random_triangles(random, 20000, 1.0f, 0.1f);
+    scene.build();
+    EXPECT_GT(scene.accelerator->bytes(), 20000u * 48);
+    EXPECT_LT(scene.accelerator->bytes(), 20000u * 1000);
+}
+
+TEST(Accelerator, ManyBuildsGiveTheMemoryBack) {
+    Random random(6);
+    TestGeometry scene;
+    scene.meshes.push_back(random_triangles(random, 2000, 1.0f, 0.2f));
+    scene.meshes.push_back(random_triangles(random, 2000, 1.0f, 0.2f));
+    for (const std::uint32_t mesh : {0u, 1u, 1u}) {
+        scene.instances.push_back(make_instance(mesh, random.affine(1.0f)));
+    }
+    std::optional<std::uint64_t> bytes;
+    const Ray ray{Vec3(0, 0, 5), Vec3(0, 0, -1)};
+    std::optional<float> t;
+    for (int i = 0; i < 100; ++i) {
+        scene.build();
+        ASSERT_LT(scene.accelerator->bytes(), 2 * bytes.value_or(scene.accelerator->bytes()));
+        bytes = scene.accelerator->bytes();
+        ASSERT_EQ(scene.trace(ray).t, t.value_or(scene.trace(ray).t));
+        t = scene.trace(ray).t;
+    }
+}
+
+TEST(Accelerator, RefusesAnInstanceOfNoMesh) {
+    TestGeometry scene;
+    scene.instances.push_back(make_instance(3, Mat4(1.0f)));
+    EXPECT_THROW(Accelerator(scene.meshes, scene.instances, CancelFlag()), std::invalid_argument);
+}
+
+TEST(Accelerator, LeavesTheFloatingPointStateAlone) {
+    TestGeometry scene;
+    scene.meshes.push_back(sphere_mesh("sphere", Vec3(0), 1.0f));
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    for (const unsigned extra : {0u, 0x8040u}) {  // flush to zero and denormals are zero
+        const unsigned before = (_mm_getcsr() & ~0x8040u) | extra;
+        _mm_setcsr(before);
+        scene.build();
+        static_cast<void>(scene.trace(Ray{Vec3(0), Vec3(0, 0, 1)}));
+        EXPECT_EQ(_mm_getcsr() & ~0x3fu, before & ~0x3fu);
+        _mm_setcsr(before & ~0x8040u);
+    }
+}
+
+TEST(Accelerator, CancelEndsTheBuildSoon) {
+    Random random(8);
+    TestGeometry scene;
+    scene.meshes.push_back(random_triangles(random, 2000000, 10.0f, 0.05f));
+    scene.instances.push_back(make_instance(0, random.affine(1.0f)));
+    for (const int milliseconds : {0, 30, 100, 200, 350, 500}) {
+        CancelFlag cancel;
+        Clock::time_point at;
+        bool finished = false;
+        {
+            const std::jthread canceller([&] {
+                std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+                at = Clock::now();
+                cancel.cancel();
+            });
+            try {
+                const Accelerator accelerator(scene.meshes, scene.instances, cancel);
+                finished = true;
+            } catch (const Cancelled&) {
+                finished = false;
+            }
+        }
+        if (!finished) {
+            RecordProperty("delay" + std::to_string(milliseconds),
+                           std::to_string(seconds_since(at)));
+            EXPECT_LT(seconds_since(at), 0.25) << "cancelled after " << milliseconds << " ms";
+        }
+        EXPECT_FALSE(finished && milliseconds < 100);
+    }
+}
+
+TEST(Accelerator, SelfTest) {
+    EXPECT_TRUE(accelerator_self_test());
+}
+
+}  // namespace
+}  // namespace pharos::testing
