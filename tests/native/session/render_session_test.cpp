@@ -1,0 +1,183 @@
+#include "session/render_session.h"
+
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "session/pass_schedule.h"
+#include "support/description_builders.h"
+#include "support/render.h"
+
+namespace pharos {
+namespace {
+
+using namespace pharos::testing;
+
+// A room with a lamp, a glossy and a glass ball: every stage but textures has work.
+SceneDescription room(std::uint32_t width, std::uint32_t height, std::uint32_t samples) {
+    SceneBuilder builder;
+    const auto white = builder.material("white", diffuse_program(Rgb(0.8f)));
+    const auto gloss = builder.material("gloss", glossy_program(Rgb(0.9f, 0.7f, 0.4f), 0.3f));
+    const auto glass = builder.material("glass", glass_program(Rgb(1.0f), 0.0f, 1.5f));
+    builder.object(box_mesh("room", Vec3(-2, -2, 0), Vec3(2, 2, 3), true), white);
+    builder.object(sphere_mesh("gloss", Vec3(-0.8f, 0.3f, 0.6f), 0.6f), gloss);
+    builder.object(sphere_mesh("glass", Vec3(0.8f, -0.2f, 0.5f), 0.5f), glass);
+    builder.lamp(area_lamp(look_at(Vec3(0, 0, 2.9f), Vec3(0)), Rgb(60.0f), 0.7f, 0.4f));
+    builder.camera(Vec3(0, -1.9f, 1.4f), Vec3(0, 0, 1), 0.8f, width, height);
+    SceneDescription description = builder.build();
+    description.settings.samples = samples;
+    return description;
+}
+
+TEST(PassSchedule, CoversEverySampleOnce) {
+    for (const std::uint64_t pixels : {1ull, 4096ull, 65536ull, 8294400ull}) {
+        std::uint32_t done = 0;
+        while (done < 1000) {
+            const PassSettings pass = next_pass(done, 1000, pixels);
+            ASSERT_EQ(pass.first_sample, done);
+            ASSERT_GE(pass.samples, 1u);
+            ASSERT_TRUE(pass.samples == 1 || pass.samples * pixels <= kPathsPerPass);
+            done += pass.samples;
+        }
+        EXPECT_EQ(done, 1000u);
+        EXPECT_EQ(next_pass(0, 1000, pixels).samples, 1u);
+    }
+}
+
+TEST(RenderSession, IsBitEqualForAnyNumberOfThreads) {
+    const Rendered one = render(room(61, 47, 8), 1);
+    ASSERT_EQ(one.progress.state, SessionState::Finished);
+    ASSERT_GT(one.mean(0), 0.01);
+    for (unsigned threads : {2u, 8u}) {
+        const Rendered other = render(room(61, 47, 8), threads);
+        ASSERT_EQ(one.combined.size(), other.combined.size());
+        EXPECT_EQ(
+            0,
+            std::memcmp(
+                one.combined.data(), other.combined.data(), one.combined.size() * sizeof(float)));
+    }
+}
+
+TEST(RenderSession, SeedsDifferAndAgreeInTheMean) {
+    SceneDescription first = room(40, 30, 64);
+    SceneDescription second = first;
+    second.settings.seed = 7;
+    const Rendered a = render(std::move(first));
+    const Rendered b = render(std::move(second));
+    EXPECT_NE(a.combined, b.combined);
+    EXPECT_NEAR(a.mean(0) / b.mean(0), 1.0, 0.02);
+}
+
+// A border renders the very pixels of the full frame.
+TEST(RenderSession, BorderEqualsTheFullFrame) {
+    SceneDescription full = room(40, 30, 4);
+    SceneDescription border = full;
+    border.film.crop_x = 11;
+    border.film.crop_y = 5;
+    border.film.crop_width = 17;
+    border.film.crop_height = 9;
+    const Rendered whole = render(std::move(full));
+    const Rendered part = render(std::move(border));
+    for (std::size_t y = 0; y < 9; ++y) {
+        for (std::size_t x = 0; x < 17 * 4; ++x) {
+            EXPECT_EQ(part.combined[y * 17 * 4 + x], whole.combined[(y + 5) * 40 * 4 + 11 * 4 + x]);
+        }
+    }
+}
+
+TEST(RenderSession, NeeAndPlainPathTracingAgree) {
+    SceneDescription with = room(32, 24, 256);
+    SceneDescription without = with;
+    without.settings.use_nee = false;
+    without.settings.samples = 4096;
+    const Rendered a = render(std::move(with));
+    const Rendered b = render(std::move(without));
+    EXPECT_EQ(b.items("sample_direct_light"), 0u);
+    EXPECT_EQ(b.items("trace_shadow_rays"), 0u);
+    EXPECT_NEAR(a.mean(1) / b.mean(1), 1.0, 0.02);
+}
+
+TEST(RenderSession, SkippedStagesCountNothing) {
+    const Rendered result = render(room(32, 24, 2));
+    EXPECT_EQ(result.items("add_escaped_radiance"), 0u);
+    EXPECT_EQ(result.items("add_emitted_radiance"), 0u);
+    EXPECT_EQ(result.items("query_guiding_field"), 0u);
+    EXPECT_EQ(result.items("train"), 0u);
+    EXPECT_EQ(result.items("generate_camera_rays"), 32u * 24u * 2u);
+    EXPECT_GT(result.items("add_lamp_radiance"), 0u);
+}
+
+TEST(RenderSession, CancelKeepsThePicture) {
+    RenderSession session(room(256, 256, 100000), 2);
+    while (session.progress().samples < 2) {
+        ASSERT_FALSE(session.wait(std::chrono::milliseconds(5)));
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    session.cancel();
+    ASSERT_TRUE(session.wait(std::chrono::seconds(5)));
+    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 1.0);
+    EXPECT_EQ(session.progress().state, SessionState::Cancelled);
+    std::vector<float> count(256 * 256);
+    ASSERT_TRUE(session.read(FilmPass::SampleCount, count));
+    EXPECT_GE(*std::min_element(count.begin(), count.end()), 2.0f);
+}
+
+TEST(RenderSession, TimeLimitStopsAndDelivers) {
+    SceneDescription description = room(128, 128, 1000000);
+    description.settings.time_limit = 0.3f;
+    const auto begin = std::chrono::steady_clock::now();
+    const Rendered result = render(std::move(description));
+    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 3.0);
+    EXPECT_EQ(result.progress.state, SessionState::Finished);
+    EXPECT_GT(result.mean(0), 0.01);
+}
+
+TEST(RenderSession, SnapshotsAreShorterRenders) {
+    SceneDescription description = room(24, 16, 16);
+    RenderSession session(description, 2, {16, 4});
+    ASSERT_TRUE(session.wait(std::chrono::seconds(20)));
+    const auto snapshots = session.snapshots();
+    ASSERT_EQ(snapshots.size(), 2u);
+    EXPECT_EQ(snapshots[0].samples, 4u);
+    description.settings.samples = 4;
+    EXPECT_EQ(snapshots[0].combined, render(std::move(description)).combined);
+    EXPECT_GT(snapshots[1].cpu_seconds, snapshots[0].cpu_seconds);
+}
+
+TEST(RenderSession, ErrorsAreSentences) {
+    SceneDescription no_camera = room(8, 8, 1);
+    no_camera.has_camera = false;
+    const Rendered failed = render(std::move(no_camera));
+    EXPECT_EQ(failed.progress.state, SessionState::Failed);
+    EXPECT_NE(failed.progress.error.find("camera"), std::string::npos);
+
+    SceneDescription outside = room(8, 8, 1);
+    outside.film.crop_x = 5;
+    EXPECT_EQ(render(std::move(outside)).progress.state, SessionState::Failed);
+
+    RenderSession session(room(8, 8, 1));
+    std::vector<float> wrong(7);
+    EXPECT_THROW(session.read(FilmPass::Combined, wrong), std::invalid_argument);
+}
+
+TEST(RenderSession, EmptySceneShowsTheWorld) {
+    SceneBuilder builder;
+    builder.world(background_program(Rgb(0.25f, 0.5f, 1.0f), 2.0f));
+    builder.camera(Vec3(0, -4, 0), Vec3(0), 0.8f, 9, 7);
+    SceneDescription description = builder.build();
+    description.settings.samples = 2;
+    const Rendered lit = render(description);
+    EXPECT_FLOAT_EQ(lit.combined[0], 0.5f);
+    EXPECT_FLOAT_EQ(lit.combined[2], 2.0f);
+    EXPECT_FLOAT_EQ(lit.combined[3], 1.0f);
+    description.film.transparent = true;
+    const Rendered transparent = render(description);
+    EXPECT_FLOAT_EQ(transparent.combined[0], 0.0f);
+    EXPECT_FLOAT_EQ(transparent.combined[3], 0.0f);
+    description.world = {};
+    EXPECT_EQ(render(description).progress.state, SessionState::Finished);
+}
+
+}  // namespace
+}  // namespace pharos
