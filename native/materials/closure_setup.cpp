@@ -1,0 +1,250 @@
+#include "materials/closure_setup.h"
+
+#include "materials/closure_albedo.h"
+#include "materials/closure_builder.h"
+#include "materials/energy.h"
+#include "materials/fresnel.h"
+#include "materials/lobes/diffuse.h"
+
+namespace pharos {
+
+ClosureSink::ClosureSink(std::span<Closure> storage)
+    : storage_(storage.first(std::min<std::size_t>(storage.size(), kMaxClosures))) {}
+
+void ClosureSink::add(const Closure& closure) {
+    if (closure.type == ClosureType::Transparent) {
+        for (Closure& c : storage_.first(count_)) {
+            if (c.type == ClosureType::Transparent) {
+                c.weight += closure.weight;
+                c.sample_weight += closure.sample_weight;
+                return;
+            }
+        }
+    }
+    if (count_ < storage_.size()) {
+        storage_[count_++] = closure;
+        return;
+    }
+    ++dropped_;
+    if (storage_.empty()) {
+        return;
+    }
+    const auto least =
+        std::min_element(storage_.begin(), storage_.end(), [](const Closure& a, const Closure& b) {
+            return a.sample_weight < b.sample_weight;
+        });
+    if (least->sample_weight < closure.sample_weight) {
+        *least = closure;
+    }
+}
+
+float ClosureSink::total_sample_weight() const {
+    float sum = 0.0f;
+    for (const Closure& c : closures()) {
+        sum += c.sample_weight;
+    }
+    return sum;
+}
+
+Vec3 ensure_valid_reflection(const Vec3& ng, const Vec3& wo, const Vec3& n) {
+    const float io = glm::dot(wo, ng);
+    const float threshold = std::min(0.9f * io, 0.01f);
+    // Height of the mirror direction above the surface.
+    if (2.0f * glm::dot(n, wo) * glm::dot(n, ng) - io >= threshold) {
+        return n;
+    }
+    // In the plane of ng and n the mirror direction of wo's projection is to have just the height
+    // `threshold`; its length stays that of the projection. n is half way between the two.
+    const Vec3 across = normalize_or(n - ng * glm::dot(n, ng), Vec3(0.0f));
+    if (is_zero(across)) {
+        return ng;
+    }
+    const float ix = glm::dot(wo, across);
+    const float length = ix * ix + io * io;
+    const float rx = safe_sqrt(length - threshold * threshold);
+    return normalize_or(across * (ix + rx) + ng * (io + threshold), ng);
+}
+
+namespace setup {
+
+Vec3 glossy_normal(const Vec3& n, const ClosureSetupContext& ctx) {
+    const Vec3 unit_n = normalize_or(n, ctx.ns);
+    return unit_n == ctx.ng ? unit_n : ensure_valid_reflection(ctx.ng, ctx.wo, unit_n);
+}
+
+Vec3 diffuse_normal(const Vec3& n, const ClosureSetupContext& ctx) {
+    return ctx.blender_version < 306 ? glossy_normal(n, ctx) : normalize_or(n, ctx.ns);
+}
+
+void set_roughness(Closure& c, float roughness) {
+    c.alpha_x = c.alpha_y = sqr(unit(roughness));
+}
+
+void set_anisotropic_roughness(Closure& c, float roughness, const Anisotropy& anisotropy) {
+    set_roughness(c, roughness);
+    const float amount = unit(anisotropy.amount);
+    const Vec3 tangent =
+        normalize_or(anisotropy.tangent - c.n * glm::dot(anisotropy.tangent, c.n), Vec3(0.0f));
+    if (amount == 0.0f || is_zero(tangent)) {
+        return;
+    }
+    const float aspect = std::sqrt(1.0f - 0.9f * amount);
+    c.alpha_x /= aspect;
+    c.alpha_y *= aspect;
+    const SinCos turn = sincos_turns(bounded(anisotropy.rotation, -1e3f, 1e3f));
+    c.tangent = glm::normalize(tangent * turn.cos + glm::cross(c.n, tangent) * turn.sin);
+}
+
+void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx) {
+    if (is_delta(c)) {
+        return;
+    }
+    const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
+    const float e = ggx_albedo(glm::dot(c.n, ctx.wo), rough);
+    const float average_e = ggx_average_albedo(rough);
+    const Rgb fms = fss * average_e / (Rgb(1.0f) - fss * (1.0f - average_e));
+    c.energy_scale = 1.0f / e;
+    c.weight *= e + fms * (1.0f - e);
+    c.smith = 0;
+}
+
+void preserve_glass_energy(Closure& c, const ClosureSetupContext& ctx) {
+    if (is_delta(c)) {
+        return;
+    }
+    const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
+    c.energy_scale = 1.0f / ggx_glass_albedo(glm::dot(c.n, ctx.wo), rough, c.eta);
+    c.smith = 0;
+}
+
+Rgb add_closure(Closure& c, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    const float weight = average(c.weight);
+    if (!(weight >= kWeightCutoff)) {
+        return Rgb(0.0f);
+    }
+    const ClosureAlbedo albedo = closure_albedo(c, ctx.wo);
+    const Rgb sum = albedo.reflected + albedo.transmitted;
+    // The floor keeps every lobe reachable, however low the estimate.
+    c.sample_weight = std::max(average(sum), 0.01f * weight);
+    sink.add(c);
+    return sum;
+}
+
+void add_diffuse(const DiffuseInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c;
+    c.type = ClosureType::Diffuse;
+    c.weight = in.weight;
+    c.n = in.normal;
+    const float sigma = unit(in.roughness);
+    if (sigma > 1e-5f) {
+        c.type = ClosureType::OrenNayar;
+        c.parameter = sigma;
+        if (ctx.blender_version >= 403) {
+            // Kulla-Conty form of the missing energy, its wo part already evaluated.
+            const OrenNayarTerms terms = oren_nayar_terms(sigma);
+            const float average_e = terms.a * kPi + terms.b * (2.0f * kPi / 3.0f - 28.0f / 15.0f);
+            const float e = oren_nayar_albedo(terms, saturate(glm::dot(c.n, ctx.wo)));
+            const Rgb rho = clamp_color(in.color);
+            const Rgb further = Rgb(1.0f) - rho * (1.0f - average_e);
+            c.f0 = rho * (average_e * std::max(1.0f - e, 0.0f) * kInvPi / (1.0f - average_e)) /
+                   further;
+        }
+    }
+    add_closure(c, ctx, sink);
+}
+
+void make_singular_without_contrast(Closure& c) {
+    if (std::abs(c.eta - 1.0f) < 1e-4f) {
+        c.alpha_x = c.alpha_y = 0.0f;
+    }
+}
+
+}  // namespace setup
+
+namespace {
+
+using namespace setup;
+
+[[nodiscard]] Rgb node_weight(const ScatterInputs& in) {
+    return safe_color(in.weight) * safe_color(in.color);
+}
+
+[[nodiscard]] float node_roughness(const ScatterInputs& in) {
+    return in.distribution == Distribution::Sharp ? 0.0f : in.roughness;
+}
+
+[[nodiscard]] Closure glossy_closure(ClosureType type,
+                                     const ScatterInputs& in,
+                                     const ClosureSetupContext& ctx) {
+    Closure c;
+    c.type = type;
+    c.weight = node_weight(in);
+    c.n = glossy_normal(in.normal, ctx);
+    c.smith = smith_of(ctx);
+    set_roughness(c, node_roughness(in));
+    return c;
+}
+
+}  // namespace
+
+void setup_diffuse(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    add_diffuse(
+        {node_weight(in), in.color, in.roughness, diffuse_normal(in.normal, ctx)}, ctx, sink);
+}
+
+void setup_glossy(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c = glossy_closure(ClosureType::GgxReflection, in, ctx);
+    if (multi_scatter(in.distribution)) {
+        preserve_reflection_energy(c, clamp_color(in.color), ctx);
+    }
+    add_closure(c, ctx, sink);
+}
+
+void setup_glass(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c = glossy_closure(ClosureType::GgxGlass, in, ctx);
+    c.eta = relative_eta(in.ior, ctx);
+    if (ctx.blender_version >= 400 || multi_scatter(in.distribution)) {
+        c.fresnel = FresnelType::Dielectric;
+        make_singular_without_contrast(c);
+        if (multi_scatter(in.distribution)) {
+            preserve_glass_energy(c, ctx);
+        }
+        add_closure(c, ctx, sink);
+        return;
+    }
+    // 3.x: two closures, weighed by the reflectance at the shading normal.
+    const float f = fresnel_dielectric(glm::dot(c.n, ctx.wo), c.eta);
+    const Rgb weight = c.weight;
+    c.type = ClosureType::GgxReflection;
+    c.weight = weight * f;
+    add_closure(c, ctx, sink);
+    c.type = ClosureType::GgxRefraction;
+    c.weight = weight * (1.0f - f);
+    make_singular_without_contrast(c);
+    add_closure(c, ctx, sink);
+}
+
+void setup_refraction(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c = glossy_closure(ClosureType::GgxRefraction, in, ctx);
+    c.eta = relative_eta(in.ior, ctx);
+    make_singular_without_contrast(c);
+    add_closure(c, ctx, sink);
+}
+
+void setup_transparent(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c;
+    c.type = ClosureType::Transparent;
+    c.weight = node_weight(in);
+    c.n = ctx.ns;
+    add_closure(c, ctx, sink);
+}
+
+void setup_translucent(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
+    Closure c;
+    c.type = ClosureType::Translucent;
+    c.weight = node_weight(in);
+    c.n = diffuse_normal(in.normal, ctx);
+    add_closure(c, ctx, sink);
+}
+
+}  // namespace pharos
