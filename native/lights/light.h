@@ -1,9 +1,9 @@
 // The light contract: what illuminates a point, how to sample it, and the density of a chance hit.
 //
-// A LightSample's pdf includes the choice of the light and is per solid angle as seen from the context
-// point; a delta light's pdf is the discrete probability of its choice and its L already holds the
-// inverse-square law (so contribution = f_cos * L / pdf in both cases). Chance hits use the same
-// context as sampling did: the *previous* vertex.
+// A LightSample's pdf includes the choice of the light and is per solid angle as seen from the
+// context point; a delta light's pdf is the discrete probability of its choice and its L already
+// holds the inverse-square law (so contribution = f_cos * L / pdf in both cases). Chance hits use
+// the same context as sampling did: the *previous* vertex.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +22,9 @@ struct LightSampleContext {
 
 struct LightSample {
     Rgb L{0.0f};
-    Vec3 wi;                  // unit, from the context point to the light
+    Vec3 wi;  // unit, from the context point to the light
     float pdf = 0.0f;
-    float distance = 0.0f;    // kInfinity for sun and world
+    float distance = 0.0f;  // kInfinity for sun and world
     bool delta = false;
     bool cast_shadow = true;
     std::uint32_t visibility = 31;  // of the light, for the receiving lobe's type
@@ -34,7 +34,7 @@ struct LightSample {
 // Emission met by a ray, and the density next-event estimation would have had for it.
 struct LightHit {
     Rgb L{0.0f};
-    float pdf = 0.0f;   // solid angle, choice included; 0: not sampled by NEE
+    float pdf = 0.0f;  // solid angle, choice included; 0: not sampled by NEE
     float distance = 0.0f;
     std::uint32_t light = 0;
     std::uint32_t visibility = 31;

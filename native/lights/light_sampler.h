@@ -1,6 +1,6 @@
-// All lights of a scene behind one interface: lamps, emissive triangles, world. Chooses a light for a
-// point (few lights: by an estimate of each one's contribution there; many: by power), samples it, and
-// returns the density of the same choice for a light that a ray met by chance.
+// All lights of a scene behind one interface: lamps, emissive triangles, world. Chooses a light for
+// a point (few lights: by an estimate of each one's contribution there; many: by power), samples
+// it, and returns the density of the same choice for a light that a ray met by chance.
 //
 // Built once per scene; const and thread-safe afterwards. Order is that of the description.
 #pragma once
@@ -38,11 +38,11 @@ struct LightSamplerInput {
 
 // A sample on an emissive triangle or the world still needs its radiance from a node program.
 struct LightSamplerSample {
-    LightSample sample;              // L is 0 for an emissive triangle and for the world
+    LightSample sample;  // L is 0 for an emissive triangle and for the world
     bool environment = false;
     std::uint32_t instance = 0xffffffffu;  // of the emissive triangle, else kNone
     std::uint32_t triangle = 0xffffffffu;
-    float u = 0.0f;                  // barycentrics on it
+    float u = 0.0f;  // barycentrics on it
     float v = 0.0f;
 };
 
@@ -58,9 +58,10 @@ class LightSampler {
                                                            float u_choice,
                                                            const Vec2& u) const;
 
-    // Nearest lamp with a surface (area, sphere, spot with radius; not delta) in (t_min, t_max) that a
-    // BSDF or camera ray may hit; `context` is null for camera rays (pdf 0).
-    [[nodiscard]] std::optional<LightHit> intersect_lamps(const Ray& ray, const LightSampleContext* context) const;
+    // Nearest lamp with a surface (area, sphere, spot with radius; not delta) in (t_min, t_max)
+    // that a BSDF or camera ray may hit; `context` is null for camera rays (pdf 0).
+    [[nodiscard]] std::optional<LightHit> intersect_lamps(const Ray& ray,
+                                                          const LightSampleContext* context) const;
     [[nodiscard]] bool has_hittable_lamps() const;
 
     // Suns with an angle seen by an escaped ray (each one's radiance along wi and NEE density).

@@ -1,0 +1,205 @@
+#include "lights/light_sampler.h"
+
+#include "core/color.h"
+#include "lights/emissive_triangles.h"
+#include "lights/lamp.h"
+#include "lights/lamp_tree.h"
+#include "lights/light_selection.h"
+
+namespace pharos {
+
+namespace {
+
+bool shines(const EnvironmentLight* environment) {
+    return environment != nullptr && average(glm::abs(environment->mean_radiance())) > 0.0f;
+}
+
+LightBound bound_environment(const EnvironmentLight& environment) {
+    LightBound bound;
+    bound.distance = EmitterDistance::Ambient;
+    bound.strength = kPi * average(glm::abs(environment.mean_radiance()));
+    return bound;
+}
+
+}  // namespace
+
+// Groups of the selection: lamps in their order, groups of emissive triangles, the world.
+struct LightSampler::Impl {
+    std::vector<Lamp> lamps;
+    EmissiveTriangles triangles;
+    const EnvironmentLight* environment = nullptr;
+    LightSelection selection;
+    LampTree tree;
+    std::vector<std::uint32_t> suns;  // lamps that an escaped ray can see
+
+    [[nodiscard]] std::uint32_t lamp_count() const {
+        return static_cast<std::uint32_t>(lamps.size());
+    }
+
+    [[nodiscard]] std::uint32_t environment_group() const {
+        return lamp_count() + triangles.group_count();
+    }
+
+    [[nodiscard]] std::optional<LightSamplerSample> sample_lamp_group(
+        const LightSampleContext& context, const Lamp& lamp, const Vec2& u) const;
+    [[nodiscard]] LightHit finish_hit(const LampHit& hit,
+                                      std::uint32_t lamp,
+                                      const LightSampleContext* context) const;
+};
+
+std::optional<LightSamplerSample> LightSampler::Impl::sample_lamp_group(
+    const LightSampleContext& context, const Lamp& lamp, const Vec2& u) const {
+    const std::optional<LampSample> sampled = sample_lamp(lamp, context, u);
+    if (!sampled) {
+        return std::nullopt;
+    }
+    LightSamplerSample result;
+    result.sample.L = sampled->L;
+    result.sample.wi = sampled->wi;
+    result.sample.pdf = sampled->pdf;
+    result.sample.distance = sampled->distance;
+    result.sample.delta = sampled->delta;
+    result.sample.cast_shadow = lamp.cast_shadow;
+    result.sample.visibility = lamp.visibility;
+    result.sample.max_bounces = lamp.max_bounces;
+    return result;
+}
+
+LightHit LightSampler::Impl::finish_hit(const LampHit& hit,
+                                        std::uint32_t lamp,
+                                        const LightSampleContext* context) const {
+    LightHit result;
+    result.L = hit.L;
+    result.distance = hit.t;
+    result.light = lamps[lamp].index;
+    result.visibility = lamps[lamp].visibility;
+    if (context != nullptr && hit.pdf > 0.0f) {
+        result.pdf = hit.pdf * selection.pmf(*context, lamp);
+    }
+    return result;
+}
+
+LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_unique<Impl>()) {
+    std::vector<LightBound> bounds;
+    for (std::uint32_t i = 0; i < input.lamps.size(); ++i) {
+        if (const auto lamp = make_lamp(input.lamps[i], input.blender_version, i)) {
+            if (lamp->hittable && is_distant(*lamp)) {
+                impl_->suns.push_back(impl_->lamp_count());
+            }
+            impl_->lamps.push_back(*lamp);
+            bounds.push_back(bound_lamp(*lamp));
+        }
+    }
+    impl_->triangles = EmissiveTriangles(input);
+    for (std::uint32_t group = 0; group < impl_->triangles.group_count(); ++group) {
+        bounds.push_back(impl_->triangles.bound(group));
+    }
+    if (shines(input.environment)) {
+        impl_->environment = input.environment;
+        bounds.push_back(bound_environment(*input.environment));
+    }
+    const Bounds3& scene = input.scene_bounds;
+    const float radius = scene.empty() ? 1.0f : 0.5f * glm::length(scene.extent());
+    impl_->selection = LightSelection(std::move(bounds), radius);
+    impl_->tree = LampTree(impl_->lamps);
+}
+
+LightSampler::~LightSampler() = default;
+LightSampler::LightSampler(LightSampler&&) noexcept = default;
+
+bool LightSampler::empty() const {
+    return impl_->selection.empty();
+}
+
+std::optional<LightSamplerSample> LightSampler::sample(const LightSampleContext& context,
+                                                       float u_choice,
+                                                       const Vec2& u) const {
+    const Impl& impl = *impl_;
+    if (impl.selection.empty()) {
+        return std::nullopt;
+    }
+    const auto choice = impl.selection.choose(context, widen_random(u_choice, u));
+    if (!choice || !(choice->pmf > 0.0f)) {
+        return std::nullopt;
+    }
+    if (choice->group < impl.lamp_count()) {
+        auto result = impl.sample_lamp_group(context, impl.lamps[choice->group], u);
+        if (result) {
+            result->sample.pdf *= choice->pmf;
+        }
+        return result;
+    }
+    LightSamplerSample result;
+    if (choice->group == impl.environment_group()) {
+        const EnvironmentLight::Sample sample = impl.environment->sample(u);
+        result.sample.wi = sample.wi;
+        result.sample.pdf = sample.pdf * choice->pmf;
+        result.sample.distance = kInfinity;
+        result.environment = true;
+        return result;
+    }
+    const auto sample =
+        impl.triangles.sample(choice->group - impl.lamp_count(), context.p, choice->u, u);
+    if (!sample) {
+        return std::nullopt;
+    }
+    result.sample.wi = sample->wi;
+    result.sample.pdf = sample->pdf * choice->pmf;
+    result.sample.distance = sample->distance;
+    result.instance = sample->instance;
+    result.triangle = sample->triangle;
+    result.u = sample->u;
+    result.v = sample->v;
+    return result;
+}
+
+std::optional<LightHit> LightSampler::intersect_lamps(const Ray& ray,
+                                                      const LightSampleContext* context) const {
+    const auto nearest = impl_->tree.intersect(ray, context);
+    if (!nearest) {
+        return std::nullopt;
+    }
+    return impl_->finish_hit(nearest->hit, nearest->lamp, context);
+}
+
+bool LightSampler::has_hittable_lamps() const {
+    return !impl_->tree.empty();
+}
+
+std::uint32_t LightSampler::sun_count() const {
+    return static_cast<std::uint32_t>(impl_->suns.size());
+}
+
+std::optional<LightHit> LightSampler::sun_hit(std::uint32_t sun,
+                                              const Vec3& wi,
+                                              const LightSampleContext* context) const {
+    const std::uint32_t lamp = impl_->suns[sun];
+    const auto hit = hit_lamp(impl_->lamps[lamp], Ray{Vec3(0.0f), wi}, context);
+    if (!hit) {
+        return std::nullopt;
+    }
+    return impl_->finish_hit(*hit, lamp, context);
+}
+
+float LightSampler::pdf_environment(const LightSampleContext& context, const Vec3& wi) const {
+    if (impl_->environment == nullptr) {
+        return 0.0f;
+    }
+    return impl_->environment->pdf(wi) * impl_->selection.pmf(context, impl_->environment_group());
+}
+
+float LightSampler::pdf_triangle(const LightSampleContext& context,
+                                 std::uint32_t instance,
+                                 std::uint32_t triangle,
+                                 float t,
+                                 float cos_light) const {
+    const EmissiveTriangles::Entry entry = impl_->triangles.find(instance, triangle);
+    const float cosine = std::abs(cos_light);
+    if (entry.group == kNone || !(cosine > 0.0f)) {
+        return 0.0f;
+    }
+    const float choice = impl_->selection.pmf(context, impl_->lamp_count() + entry.group);
+    return choice * entry.pdf_area * t * t / cosine;
+}
+
+}  // namespace pharos
