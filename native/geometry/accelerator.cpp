@@ -1,21 +1,31 @@
 #include "geometry/accelerator.h"
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <exception>
+#include <memory>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include <embree3/rtcore.h>
 
 #include "core/check.h"
 #include "core/fp_state.h"
+#include "geometry/instance_surface.h"
 
 namespace pharos {
 
 namespace {
 
 constexpr std::uint32_t kCancelPollInterval = 1u << 16;  // vertices or triangles copied in between
+constexpr std::size_t kShortBuild = 100000;              // triangles or instances, tens of ms
+constexpr std::chrono::milliseconds kPollInterval(5);
+constexpr std::chrono::milliseconds kPatience(100);  // with a build that has been told to stop
 
 struct DeviceRelease {
     void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
@@ -35,7 +45,7 @@ using GeometryPtr = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
 
 // What Embree's callbacks see while it builds, on any of its threads.
 struct Monitor {
-    const CancelFlag* cancel = nullptr;  // null once building is over
+    std::atomic<bool> stop{false};
     std::atomic<std::int64_t> bytes{0};
 };
 
@@ -43,11 +53,11 @@ bool on_memory(void* user, ssize_t change, bool /*post*/) {
     auto& monitor = *static_cast<Monitor*>(user);
     monitor.bytes.fetch_add(change, std::memory_order_relaxed);
     // A refused allocation ends a build early; releases are never refused.
-    return change <= 0 || monitor.cancel == nullptr || !monitor.cancel->cancelled();
+    return change <= 0 || !monitor.stop.load(std::memory_order_relaxed);
 }
 
 bool on_progress(void* user, double /*fraction*/) {
-    return !static_cast<const Monitor*>(user)->cancel->cancelled();
+    return !static_cast<const Monitor*>(user)->stop.load(std::memory_order_relaxed);
 }
 
 void throw_if_cancelled(const CancelFlag& cancel) {
@@ -56,10 +66,7 @@ void throw_if_cancelled(const CancelFlag& cancel) {
     }
 }
 
-// Turns the device's last error of this thread into an exception.
-void check_device(RTCDevice device, const CancelFlag& cancel) {
-    const RTCError error = rtcGetDeviceError(device);
-    throw_if_cancelled(cancel);
+void throw_if_failed(RTCError error) {
     switch (error) {
         case RTC_ERROR_NONE:
             return;
@@ -88,7 +95,6 @@ DevicePtr make_device() {
 ScenePtr make_scene(RTCDevice device, Monitor& monitor) {
     ScenePtr scene(rtcNewScene(device));
     if (scene == nullptr) {
-        check_device(device, *monitor.cancel);
         throw std::bad_alloc();
     }
     rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
@@ -115,7 +121,7 @@ GeometryPtr make_triangles(RTCDevice device,
                                                                           RTC_FORMAT_UINT3,
                                                                           3 * sizeof(std::uint32_t),
                                                                           mesh.triangles.size()));
-    check_device(device, cancel);
+    throw_if_failed(rtcGetDeviceError(device));
     CHECK(vertices != nullptr && triangles != nullptr);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         if (i % kCancelPollInterval == 0) {
@@ -173,41 +179,124 @@ void fill(RTCRay& out, const Ray& ray, std::uint32_t mask) {
     out.flags = 0;
 }
 
-}  // namespace
-
-struct Accelerator::Impl {
-    Monitor monitor;
+// Everything a build makes. Shared with the thread that runs a long build.
+struct Structure {
+    Monitor monitor;  // outlives the device, whose end it still counts
     DevicePtr device;
     std::vector<ScenePtr> objects;  // of meshes used more than once, by mesh index
     ScenePtr scene;
+};
+
+struct Commit {
+    std::shared_ptr<Structure> structure;
+    RTCScene scene = nullptr;
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool done = false;
+    RTCError error = RTC_ERROR_NONE;
+
+    void run() {
+        const FloatStateGuard float_state;
+        rtcCommitScene(scene);
+        const std::lock_guard lock(mutex);
+        error = rtcGetDeviceError(structure->device.get());  // errors are kept by thread
+        done = true;
+        changed.notify_all();
+    }
+
+    // True when the build has ended within the time.
+    bool wait(std::chrono::milliseconds time) {
+        std::unique_lock lock(mutex);
+        return changed.wait_for(lock, time, [this] { return done; });
+    }
+};
+
+// Builds that were cancelled but still run: Embree asks its monitor only between stages, which take
+// up to seconds for ten million triangles. They are joined when they have ended or, at the latest,
+// when the process exits, because Embree must not be torn down under them.
+class AbandonedBuilds {
+  public:
+    static AbandonedBuilds& instance() {
+        static AbandonedBuilds builds;
+        return builds;
+    }
+
+    void keep(std::jthread thread, std::shared_ptr<Commit> commit) {
+        const std::lock_guard lock(mutex_);
+        std::erase_if(builds_, [](const Build& build) {
+            return build.commit->wait(std::chrono::milliseconds(0));
+        });
+        builds_.push_back({std::move(commit), std::move(thread)});
+    }
+
+  private:
+    struct Build {
+        std::shared_ptr<Commit> commit;
+        std::jthread thread;  // joined before commit goes
+    };
+
+    std::mutex mutex_;
+    std::vector<Build> builds_;
+};
+
+// A build too long to wait for its end runs on a thread of its own, and is left behind there when
+// it does not end soon after it was cancelled.
+void commit_scene(const std::shared_ptr<Structure>& structure,
+                  RTCScene scene,
+                  std::size_t triangles,
+                  const CancelFlag& cancel) {
+    throw_if_cancelled(cancel);
+    const auto commit = std::make_shared<Commit>();
+    commit->structure = structure;
+    commit->scene = scene;
+    if (triangles < kShortBuild) {
+        commit->run();
+    } else {
+        std::jthread thread([commit] { commit->run(); });
+        while (!commit->wait(kPollInterval)) {
+            if (!cancel.cancelled()) {
+                continue;
+            }
+            structure->monitor.stop.store(true, std::memory_order_relaxed);
+            if (!commit->wait(kPatience)) {
+                AbandonedBuilds::instance().keep(std::move(thread), commit);
+            }
+            throw Cancelled();
+        }
+    }
+    throw_if_cancelled(cancel);
+    throw_if_failed(commit->error);
+}
+
+}  // namespace
+
+struct Accelerator::Impl {
+    std::shared_ptr<Structure> structure = std::make_shared<Structure>();
+    RTCScene scene = nullptr;  // the structure's
     Bounds3 bounds;
 
     void build(std::span<const Mesh> meshes,
                std::span<const Instance> instances,
                const CancelFlag& cancel);
-    void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility);
-    void commit(RTCScene target, const CancelFlag& cancel);
-    RTCScene object_scene(const Mesh& mesh, std::uint32_t index, const CancelFlag& cancel);
+    void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility) const;
+    [[nodiscard]] RTCScene object_scene(const Mesh& mesh,
+                                        std::uint32_t index,
+                                        const CancelFlag& cancel) const;
 };
-
-void Accelerator::Impl::commit(RTCScene target, const CancelFlag& cancel) {
-    rtcCommitScene(target);
-    check_device(device.get(), cancel);
-}
 
 // The scene of a shared mesh, built when it is first met.
 RTCScene Accelerator::Impl::object_scene(const Mesh& mesh,
                                          std::uint32_t index,
-                                         const CancelFlag& cancel) {
-    ScenePtr& object = objects[index];
+                                         const CancelFlag& cancel) const {
+    RTCDevice device = structure->device.get();
+    ScenePtr& object = structure->objects[index];
     if (object == nullptr) {
-        ScenePtr built = make_scene(device.get(), monitor);
-        const GeometryPtr geometry = make_triangles(device.get(), mesh, nullptr, cancel);
+        object = make_scene(device, structure->monitor);
+        const GeometryPtr geometry = make_triangles(device, mesh, nullptr, cancel);
         rtcSetGeometryMask(geometry.get(), 0xffffffffu);
         rtcCommitGeometry(geometry.get());
-        rtcAttachGeometryByID(built.get(), geometry.get(), 0);
-        commit(built.get(), cancel);
-        object = std::move(built);
+        rtcAttachGeometryByID(object.get(), geometry.get(), 0);
+        commit_scene(structure, object.get(), mesh.triangles.size(), cancel);
     }
     return object.get();
 }
@@ -215,27 +304,23 @@ RTCScene Accelerator::Impl::object_scene(const Mesh& mesh,
 // The geometry's id in the scene is the index of its instance.
 void Accelerator::Impl::attach(std::uint32_t index,
                                const GeometryPtr& geometry,
-                               std::uint32_t visibility) {
+                               std::uint32_t visibility) const {
     rtcSetGeometryMask(geometry.get(), visibility);
     rtcCommitGeometry(geometry.get());
-    rtcAttachGeometryByID(scene.get(), geometry.get(), index);
+    rtcAttachGeometryByID(scene, geometry.get(), index);
 }
 
 void Accelerator::Impl::build(std::span<const Mesh> meshes,
                               std::span<const Instance> instances,
                               const CancelFlag& cancel) {
-    std::vector<std::uint32_t> uses(meshes.size(), 0);
-    for (const Instance& instance : instances) {
-        if (instance.mesh >= meshes.size()) {
-            throw std::invalid_argument("Accelerator: an instance refers to no mesh");
-        }
-        ++uses[instance.mesh];
-    }
-    monitor.cancel = &cancel;
-    device = make_device();
-    rtcSetDeviceMemoryMonitorFunction(device.get(), on_memory, &monitor);
-    objects.resize(meshes.size());
-    scene = make_scene(device.get(), monitor);
+    structure->device = make_device();
+    RTCDevice device = structure->device.get();
+    rtcSetDeviceMemoryMonitorFunction(device, on_memory, &structure->monitor);
+    structure->objects.resize(meshes.size());
+    structure->scene = make_scene(device, structure->monitor);
+    scene = structure->scene.get();
+    const std::vector<std::uint32_t> uses = count_mesh_uses(meshes.size(), instances);
+    std::size_t primitives = 0;
     for (std::uint32_t i = 0; i < instances.size(); ++i) {
         const Instance& instance = instances[i];
         const Mesh& mesh = meshes[instance.mesh];
@@ -244,28 +329,33 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
             continue;
         }
         if (uses[instance.mesh] == 1) {
-            attach(i,
-                   make_triangles(device.get(), mesh, &instance.to_world, cancel),
-                   instance.visibility);
+            attach(
+                i, make_triangles(device, mesh, &instance.to_world, cancel), instance.visibility);
+            primitives += mesh.triangles.size();
         } else {
             RTCScene object = object_scene(mesh, instance.mesh, cancel);
-            attach(i, make_instance(device.get(), object, instance.to_world), instance.visibility);
+            attach(i, make_instance(device, object, instance.to_world), instance.visibility);
+            ++primitives;
         }
     }
-    check_device(device.get(), cancel);
-    commit(scene.get(), cancel);
+    throw_if_failed(rtcGetDeviceError(device));
+    commit_scene(structure, scene, primitives, cancel);
 
     RTCBounds b;
-    rtcGetSceneBounds(scene.get(), &b);
+    rtcGetSceneBounds(scene, &b);
     bounds.lower = Vec3(b.lower_x, b.lower_y, b.lower_z);
     bounds.upper = Vec3(b.upper_x, b.upper_y, b.upper_z);
-    monitor.cancel = nullptr;
 }
 
 Accelerator::Accelerator(std::span<const Mesh> meshes,
                          std::span<const Instance> instances,
                          const CancelFlag& cancel)
     : impl_(std::make_unique<Impl>()) {
+    for (const Instance& instance : instances) {
+        if (instance.mesh >= meshes.size()) {
+            throw std::invalid_argument("Accelerator: an instance refers to no mesh");
+        }
+    }
     const FloatStateGuard float_state;
     impl_->build(meshes, instances, cancel);
 }
@@ -278,7 +368,7 @@ void Accelerator::intersect(std::span<const Ray> rays,
     DCHECK(visibility.size() >= rays.size() && hits.size() >= rays.size());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    RTCScene scene = impl_->scene.get();
+    RTCScene scene = impl_->scene;
     RTCRayHit query;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         hits[i] = Hit{};
@@ -305,7 +395,7 @@ void Accelerator::occluded(std::span<const Ray> rays, std::span<std::uint8_t> oc
     DCHECK(occluded.size() >= rays.size());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    RTCScene scene = impl_->scene.get();
+    RTCScene scene = impl_->scene;
     RTCRay query;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         occluded[i] = 0;
@@ -323,7 +413,7 @@ Bounds3 Accelerator::bounds() const {
 }
 
 std::uint64_t Accelerator::bytes() const {
-    const std::int64_t bytes = impl_->monitor.bytes.load(std::memory_order_relaxed);
+    const std::int64_t bytes = impl_->structure->monitor.bytes.load(std::memory_order_relaxed);
     return bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
 }
 
