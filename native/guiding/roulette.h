@@ -4,7 +4,7 @@
 //
 // r = lum(throughput * albedo) * A / pi / I_pixel is the expected contribution of going on relative
 // to the pixel. Below the window a path survives with r / lower, above it is split. Either way
-// weights stay unbiased: the expected number of continuations times their weight is one.
+// weights stay unbiased: the continuations' weights sum to one in the mean (splitting: always).
 #pragma once
 
 #include <algorithm>
@@ -41,8 +41,7 @@ struct RouletteDecision {
         const float expected = std::min(static_cast<float>(window.max_copies), r / upper);
         const int copies =
             std::clamp(static_cast<int>(std::floor(expected + u)), 1, window.max_copies);
-        // E[copies] = expected, so 1 / expected keeps the sum's mean at one.
-        return {copies, 1.0f / expected};
+        return {copies, 1.0f / static_cast<float>(copies)};
     }
     return {};
 }

@@ -99,6 +99,28 @@ namespace {
     }
 }
 
+struct ClosureChoice {
+    const Closure* closure = nullptr;  // null: none has a sample weight
+    float u_branch = 0.0f;  // what is left of u_closure within its interval: fresh in [0, 1)
+};
+
+[[nodiscard]] inline ClosureChoice choose_closure(const Bsdf& bsdf, float u_closure) {
+    ClosureChoice choice;
+    float remaining = u_closure * bsdf.total_sample_weight;
+    for (const Closure& c : bsdf.closures) {
+        if (!(c.sample_weight > 0.0f)) {
+            continue;
+        }
+        choice.closure = &c;
+        choice.u_branch = std::min(remaining / c.sample_weight, kOneMinusEpsilon);
+        if (remaining < c.sample_weight) {
+            break;
+        }
+        remaining -= c.sample_weight;
+    }
+    return choice;
+}
+
 // A delta closure chosen with probability `share`.
 [[nodiscard]] std::optional<BsdfSample> sample_delta(const Closure& c,
                                                      const Bsdf& bsdf,
@@ -187,21 +209,7 @@ std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, float u_closure, const V
     if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
         return sample_single_diffuse(bsdf, u);
     }
-    // Choose a closure; what is left of u_closure within its interval is a fresh random number.
-    const Closure* chosen = nullptr;
-    float remaining = u_closure * bsdf.total_sample_weight;
-    float u_branch = 0.0f;
-    for (const Closure& c : bsdf.closures) {
-        if (!(c.sample_weight > 0.0f)) {
-            continue;
-        }
-        chosen = &c;
-        u_branch = std::min(remaining / c.sample_weight, kOneMinusEpsilon);
-        if (remaining < c.sample_weight) {
-            break;
-        }
-        remaining -= c.sample_weight;
-    }
+    const auto [chosen, u_branch] = choose_closure(bsdf, u_closure);
     if (chosen == nullptr) {
         return std::nullopt;
     }
@@ -233,6 +241,21 @@ std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, float u_closure, const V
     s.eta = transmits && chosen->type != ClosureType::Translucent ? chosen->eta : 1.0f;
     s.roughness = lobe_roughness(*chosen);
     return s;
+}
+
+bool chooses_delta(const Bsdf& bsdf, float u_closure) {
+    const Closure* chosen = choose_closure(bsdf, u_closure).closure;
+    return chosen != nullptr && is_delta(*chosen);
+}
+
+std::uint8_t guided_lobe(const Bsdf& bsdf, float u_closure, const Vec3& wi) {
+    const bool transmitted = glm::dot(wi, bsdf.ng) < 0.0f;
+    const Closure* chosen = choose_closure(bsdf, u_closure).closure;
+    if (chosen == nullptr || is_delta(*chosen)) {
+        return transmitted ? kLobeDiffuse | kLobeTransmission : kLobeDiffuse;
+    }
+    const std::uint8_t kind = lobe_bits(*chosen, false) & (kLobeDiffuse | kLobeGlossy);
+    return static_cast<std::uint8_t>(transmitted ? kind | kLobeTransmission : kind);
 }
 
 BsdfTraits bsdf_traits(const Bsdf& bsdf) {

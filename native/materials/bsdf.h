@@ -104,4 +104,11 @@ struct BsdfTraits {
                                                     const Vec2& u);
 [[nodiscard]] BsdfTraits bsdf_traits(const Bsdf& bsdf);
 
+// Whether sample_bsdf would choose a delta closure for this u_closure.
+[[nodiscard]] bool chooses_delta(const Bsdf& bsdf, float u_closure);
+
+// Bits for a direction that came from elsewhere (a guide): those of the smooth closure u_closure
+// picks by sample weight, reflecting or transmitting as wi lies to ng.
+[[nodiscard]] std::uint8_t guided_lobe(const Bsdf& bsdf, float u_closure, const Vec3& wi);
+
 }  // namespace pharos
