@@ -1,5 +1,5 @@
-// Scene descriptions in a file: versioned, checksummed, little-endian; images are embedded, so that a
-// dump renders the same anywhere. Written to a temporary name and renamed.
+// Scene descriptions in a file: versioned, checksummed, little-endian; images are embedded, so that
+// a dump renders the same anywhere. Written to a temporary name and renamed.
 //
 // Errors: std::runtime_error with the path and what is wrong (truncated, foreign, damaged, newer).
 #pragma once
