@@ -131,7 +131,7 @@ struct ClosureChoice {
     if (c.type == ClosureType::Transparent) {
         s.wi = -bsdf.wo;
         s.pdf = share;
-        s.f_cos = c.weight * share;
+        s.f_cos = c.weight;
         s.lobe = kLobeDelta | kLobeTransparent;
         return s;
     }
@@ -146,7 +146,7 @@ struct ClosureChoice {
     if (u_branch < reflect) {
         s.wi = glm::normalize(c.n * (2.0f * zo) - bsdf.wo);
         s.pdf = share * reflect;
-        s.f_cos = c.weight * split.reflected * (c.energy_scale * share);
+        s.f_cos = c.weight * split.reflected * c.energy_scale;
         s.lobe = kLobeDelta;
     } else {
         const float cosine = refracted_cosine(zo, c.eta);
@@ -155,7 +155,7 @@ struct ClosureChoice {
         }
         s.wi = glm::normalize(c.n * (zo / c.eta - cosine) - bsdf.wo * (1.0f / c.eta));
         s.pdf = share * (1.0f - reflect);
-        s.f_cos = c.weight * split.transmitted * (c.energy_scale * share);
+        s.f_cos = c.weight * split.transmitted * c.energy_scale;
         s.lobe = kLobeDelta | kLobeTransmission;
         s.eta = c.eta;
     }

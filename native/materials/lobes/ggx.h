@@ -133,7 +133,8 @@ namespace detail {
         visible_pdf * jacobian * (1.0f - reflect)};
 }
 
-// u_branch decides between reflection and refraction.
+// u_branch decides between reflection and refraction; a direction that ends up on the other side of
+// the surface than its branch says is lost.
 [[nodiscard]] inline std::optional<Vec3> sample_ggx_glass(const Closure& c,
                                                           const Vec3& wo,
                                                           float u_branch,
@@ -149,13 +150,15 @@ namespace detail {
         return std::nullopt;
     }
     if (u_branch < detail::reflect_probability(closure_fresnel_split(c, oh))) {
-        return glm::normalize(h * (2.0f * oh) - wo);
+        const Vec3 mirrored = glm::normalize(h * (2.0f * oh) - wo);
+        return glm::dot(c.n, mirrored) > 0.0f ? std::optional(mirrored) : std::nullopt;
     }
     const float cosine = refracted_cosine(oh, c.eta);
     if (cosine < 0.0f) {
         return std::nullopt;
     }
-    return glm::normalize(h * (oh / c.eta - cosine) - wo * (1.0f / c.eta));
+    const Vec3 refracted = glm::normalize(h * (oh / c.eta - cosine) - wo * (1.0f / c.eta));
+    return glm::dot(c.n, refracted) < 0.0f ? std::optional(refracted) : std::nullopt;
 }
 
 }  // namespace pharos
