@@ -19,10 +19,21 @@
 
 namespace pharos {
 
+// The part of a program that one question needs: value operations, then closure operations.
+struct ProgramSlice {
+    std::vector<NodeOp> values;
+    std::vector<NodeOp> closures;
+};
+
 // A checked program: every operand, register, table and image index is in range.
 struct Material {
     std::string name;
-    NodeProgram program;
+    NodeProgram program;        // constants folded, registers renumbered, dead operations gone
+    ProgramSlice surface;       // all closures
+    ProgramSlice emission;      // those that emit
+    ProgramSlice transparency;  // those that let light straight through
+    std::vector<std::uint8_t> straight_alpha;  // by image use: its alpha is read too
+    std::uint32_t max_closures = 0;            // that one hit can have
     bool constant = false;     // no value operation: closures follow from constants alone
     bool emits = false;        // holds an Emission (or a Principled whose emission may be > 0)
     bool scatters = false;     // holds any other closure
@@ -33,8 +44,13 @@ struct Material {
     Rgb emission_estimate{0.0f};  // mean emitted radiance, for light choice
 };
 
-// Checks `program` (a broken index is reported and the material becomes grey diffuse).
-[[nodiscard]] Material compile_material(std::string name, NodeProgram program, SceneReport& report);
+// Checks `program` (a broken index is reported and the material becomes grey diffuse) and does once
+// what needs no hit: constant values, dead operations, flags. `textures` (index = ImageUse::image)
+// serve the estimate of textured emission alone.
+[[nodiscard]] Material compile_material(std::string name,
+                                        NodeProgram program,
+                                        SceneReport& report,
+                                        std::span<const Texture> textures = {});
 
 // What the Light Path node tells of the ray that made a hit.
 struct PathInfo {
@@ -52,14 +68,20 @@ struct ShadingContext {
     std::span<const Instance> instances;
     std::span<const Texture> textures;  // index = SceneDescription::images
     std::uint32_t blender_version = 304;
-    Mat4 world_to_camera{1.0f};       // looks along -z
-    Mat4 camera_to_window{1.0f};      // projective: the frame is [0, 1] x [0, 1]
-    std::span<const PathInfo> paths;  // of the hits or directions; empty: camera rays
+    Mat4 world_to_camera{1.0f};            // looks along -z
+    Mat4 camera_to_window{1.0f};           // projective: the frame is [0, 1] x [0, 1]
+    std::span<const PathInfo> paths;       // of the hits or directions; empty: camera rays
+    std::span<const Bounds3> mesh_bounds;  // object space, by mesh; empty: found when first needed
 };
 
 // Working memory of one thread, reused from call to call so that shading does not allocate.
 struct ShadingScratch {
     std::vector<float> registers;
+    std::vector<float> coordinates;           // of image look-ups
+    std::vector<float> texels;                // of box projections
+    std::vector<SurfaceInteraction> hits;     // stand-ins of world directions
+    std::vector<Bounds3> mesh_bounds;         // by mesh, where the context has none
+    std::vector<const Vec3*> bounded_meshes;  // positions that mesh_bounds belong to
 };
 
 // Closures of a batch: path i has closures [first[i], first[i] + count[i]) and emitted radiance.

@@ -27,11 +27,12 @@ enum class NodeOpCode : std::uint16_t {
     // --- values ---
     Copy = 0,              // a:mode -> mode (mode = 1 or 3 components)
     Uv = 1,                // mode = name index (names[mode]) of a mesh's uv map, kDefaultName: its
-                           // first -> 3; a mesh without uv maps: Generated; an unknown name: 0
+                           // first -> 3 (0 where there is no such map)
     Geometry = 2,          // mode = GeometryOutput -> 1 or 3
     Coordinate = 3,        // mode = CoordinateOutput -> 3
-    Image = 4,             // vector:3; mode = image use index (images[mode]) -> 4 (rgb, alpha)
-    EnvironmentImage = 5,  // direction:3; mode = image use index -> 4
+    Image = 4,             // vector:3 (default: the first uv map); mode = image use index
+                           // (images[mode]) -> 4 (rgb, alpha)
+    EnvironmentImage = 5,  // direction:3 (default: Position); mode = image use index -> 4
     ScalarToVector = 6,    // x:1 -> 3
     Luminance = 7,         // color:3 -> 1
     VectorAverage = 8,     // vector:3 -> 1
@@ -45,13 +46,13 @@ enum class NodeOpCode : std::uint16_t {
     Combine = 15,      // x:1 y:1 z:1 -> 3 (separating: name the component's register or constant)
     Fresnel = 16,      // ior:1 normal:3 -> 1
     LayerWeight = 17,  // blend:1 normal:3; -> 2 (fresnel, facing)
-    NormalMap = 18,    // strength:1 color:3 (| uv:3 for tangent space, else the first uv map);
-                       // mode = NormalMapSpace -> 3
-    ObjectInfo = 19,   // mode = ObjectInfoOutput -> 1 or 3
-    CameraData = 20,   // mode = CameraDataOutput -> 1 or 3
-    LightPath = 21,    // mode = LightPathOutput -> 1
-    MapRange = 22,     // x:1 from_min:1 from_max:1 to_min:1 to_max:1 steps:1; mode = MapRangeMode
-                       // (| kClampBit) -> 1
+    NormalMap = 18,   // strength:1 color:3; mode = NormalMapSpace | (name index + 1) << 2 of the uv
+                      // map that gives the tangent (0 there: the first) -> 3
+    ObjectInfo = 19,  // mode = ObjectInfoOutput -> 1 or 3
+    CameraData = 20,  // mode = CameraDataOutput -> 1 or 3
+    LightPath = 21,   // mode = LightPathOutput -> 1
+    MapRange = 22,    // x:1 from_min:1 from_max:1 to_min:1 to_max:1 steps:1; mode = MapRangeMode
+                      // (| kClampBit) -> 1
     VectorMapRange = 23,  // the same with :3 for every operand -> 3
     Clamp = 24,           // x:1 min:1 max:1; mode = 0 min/max, 1 range (swaps if min > max) -> 1
     Invert = 25,          // factor:1 color:3 -> 3
@@ -63,8 +64,9 @@ enum class NodeOpCode : std::uint16_t {
                          // -> 3. RGB, vector and float curves (float: ScalarToVector before)
     SeparateColor = 30,  // color:3; mode = ColorModel -> 3
     CombineColor = 31,   // a:1 b:1 c:1; mode = ColorModel -> 3
-    Checker = 32,        // vector:3 color1:3 color2:3 scale:1 -> 4 (color, factor)
-    Gradient = 33,       // vector:3; mode = GradientMode -> 1
+    Checker = 32,        // vector:3 (default: Generated) color1:3 color2:3 scale:1 -> 4
+                         // (color, factor)
+    Gradient = 33,       // vector:3 (default: Generated); mode = GradientMode -> 1
     VectorTransform = 34,  // vector:3; mode = from + 3 * to + 9 * type; spaces 0 world 1 object
                            // 2 camera; type 0 vector 1 point 2 normal -> 3
     VectorRotate = 35,     // vector:3 center:3 axis:3 angle:1 rotation:3; mode = VectorRotateMode
