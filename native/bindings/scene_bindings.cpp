@@ -407,6 +407,8 @@ void bind_scene(py::module_& m) {
         .def_readonly("material_sets", &SceneDescription::material_sets)
         .def_property_readonly("mesh_count",
                                [](const SceneDescription& s) { return s.meshes.size(); })
+        .def(
+            "copy", [](const SceneDescription& s) { return SceneDescription(s); }, FreeGuard())
         .def("mesh", &mesh_as_dict, FloatGuard(), py::arg("index"));
 
     m.def("write_dump", &write_dump, FreeGuard(), py::arg("description"), py::arg("path"));

@@ -1,12 +1,17 @@
 // Render sessions: start, poll, read, cancel.
 #include <chrono>
 #include <span>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
 #include "bindings/bindings.h"
+#include "image/image_io.h"
 #include "session/render_session.h"
 
 namespace py = pybind11;
@@ -52,6 +57,28 @@ void bind_results(py::module_& m) {
         .def_readonly("message", &ReportEntry::message);
 }
 
+using PixelArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using PassTuple = std::tuple<std::string, std::string, PixelArray>;  // name, channels, pixels
+
+void write_passes(const std::string& path,
+                  std::uint32_t width,
+                  std::uint32_t height,
+                  const std::vector<PassTuple>& arrays) {
+    std::vector<ExrPass> passes;
+    for (const auto& [name, channels, pixels] : arrays) {
+        passes.push_back(
+            {name, channels, std::span(pixels.data(), static_cast<std::size_t>(pixels.size()))});
+    }
+    std::string error;
+    {
+        const py::gil_scoped_release release;
+        error = write_exr(path, width, height, passes);
+    }
+    if (!error.empty()) {
+        throw std::runtime_error(path + ": " + error);
+    }
+}
+
 // The destructor cancels and joins: other Python threads must be able to run meanwhile.
 struct FreeDelete {
     void operator()(RenderSession* session) const {
@@ -64,6 +91,14 @@ struct FreeDelete {
 
 void bind_session(py::module_& m) {
     bind_results(m);
+    m.def("write_exr",
+          &write_passes,
+          FloatGuard(),
+          py::arg("path"),
+          py::arg("width"),
+          py::arg("height"),
+          py::arg("passes"),
+          "Passes are (name, channel letters, pixels with the bottom row first).");
     using Holder = std::unique_ptr<RenderSession, FreeDelete>;
     py::class_<RenderSession, Holder>(m, "RenderSession", py::module_local())
         .def(py::init([](SceneDescription& description, unsigned threads) {

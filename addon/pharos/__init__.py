@@ -1,0 +1,24 @@
+"""Pharos: a guided path tracer for Blender."""
+
+bl_info = {
+    "name": "Pharos",
+    "description": "Path tracer that learns where the light is while it renders",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "Render Properties > Render Engine > Pharos",
+    "category": "Render",
+}
+
+from . import engine, handlers, operators, panels, properties  # noqa: E402
+
+_PARTS = (properties, engine, operators, panels, handlers)
+
+
+def register():
+    for part in _PARTS:
+        part.register()
+
+
+def unregister():
+    for part in reversed(_PARTS):
+        part.unregister()

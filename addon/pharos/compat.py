@@ -1,0 +1,118 @@
+"""Every difference between Blender versions that the add-on has to know."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+VERSION = bpy.app.version
+_FLAT_PASSES = VERSION >= (4, 0, 0)
+_CORNER_NORMALS = VERSION >= (4, 1, 0)
+_FAST_ATTRIBUTES = VERSION >= (3, 6, 0)
+
+
+def version_number() -> int:
+    """Major * 100 + minor: the formulas of the look follow it."""
+    return VERSION[0] * 100 + VERSION[1]
+
+
+def set_pass_pixels(render_pass, pixels: np.ndarray) -> None:
+    """`pixels`: float32 (n, channels), bottom row first."""
+    render_pass.rect.foreach_set(pixels.ravel() if _FLAT_PASSES else pixels)
+
+
+def _read(collection, name: str, count: int, components: int, dtype=np.float32) -> np.ndarray:
+    out = np.empty(count * components, dtype)
+    if count:
+        collection.foreach_get(name, out)
+    return out.reshape(count, components) if components > 1 else out
+
+
+def mesh_positions(mesh) -> np.ndarray:
+    count = len(mesh.vertices)
+    if _FAST_ATTRIBUTES and "position" in mesh.attributes:
+        return _read(mesh.attributes["position"].data, "vector", count, 3)
+    return _read(mesh.vertices, "co", count, 3)
+
+
+def corner_vertices(mesh) -> np.ndarray:
+    count = len(mesh.loops)
+    if _FAST_ATTRIBUTES and ".corner_vert" in mesh.attributes:
+        return _read(mesh.attributes[".corner_vert"].data, "value", count, 1, np.int32)
+    return _read(mesh.loops, "vertex_index", count, 1, np.int32)
+
+
+def triangle_corners(mesh) -> np.ndarray:
+    """Loop indices of each triangle."""
+    mesh.calc_loop_triangles()
+    return _read(mesh.loop_triangles, "loops", len(mesh.loop_triangles), 3, np.int32)
+
+
+def triangle_polygons(mesh) -> np.ndarray:
+    count = len(mesh.loop_triangles)
+    if hasattr(mesh, "loop_triangle_polygons"):
+        return _read(mesh.loop_triangle_polygons, "value", count, 1, np.int32)
+    return _read(mesh.loop_triangles, "polygon_index", count, 1, np.int32)
+
+
+def polygon_materials(mesh) -> np.ndarray:
+    return _read(mesh.polygons, "material_index", len(mesh.polygons), 1, np.int32)
+
+
+def polygon_smooth(mesh) -> np.ndarray:
+    return _read(mesh.polygons, "use_smooth", len(mesh.polygons), 1, np.bool_)
+
+
+def vertex_normals(mesh) -> np.ndarray:
+    return _read(mesh.vertex_normals, "vector", len(mesh.vertices), 3)
+
+
+def normal_domain(mesh) -> str:
+    """'FACE', 'POINT' or 'CORNER': the cheapest domain that holds the mesh's normals."""
+    if _CORNER_NORMALS:
+        return mesh.normals_domain
+    if mesh.use_auto_smooth or mesh.has_custom_normals:
+        return "CORNER"
+    smooth = polygon_smooth(mesh)
+    if smooth.all():
+        return "POINT"
+    return "CORNER" if smooth.any() else "FACE"
+
+
+def corner_normals(mesh) -> np.ndarray:
+    if _CORNER_NORMALS:
+        return _read(mesh.corner_normals, "vector", len(mesh.loops), 3)
+    mesh.calc_normals_split()
+    normals = _read(mesh.loops, "normal", len(mesh.loops), 3)
+    mesh.free_normals_split()
+    return normals
+
+
+def uv_coordinates(layer, corner_count: int) -> np.ndarray:
+    if hasattr(layer, "uv"):
+        return _read(layer.uv, "vector", corner_count, 2)
+    return _read(layer.data, "uv", corner_count, 2)
+
+
+def light_strength(light) -> np.ndarray:
+    """Colour x watts (a sun's: W/m2), with what newer versions add."""
+    strength = np.array(light.color, np.float64) * light.energy
+    if getattr(light, "use_temperature", False):
+        strength *= np.array(light.temperature_color, np.float64)
+    return strength * 2.0 ** getattr(light, "exposure", 0.0)
+
+
+def light_casts_shadow(light) -> bool:
+    cycles = getattr(light, "cycles", None)
+    if cycles is not None and hasattr(cycles, "cast_shadow"):
+        return cycles.cast_shadow
+    return light.use_shadow
+
+
+def material_samples_emission(material) -> bool:
+    """Whether next-event estimation goes towards a material's emission."""
+    cycles = getattr(material, "cycles", None)
+    if hasattr(cycles, "emission_sampling"):
+        return cycles.emission_sampling != "NONE"
+    return getattr(cycles, "sample_as_light", True)
+

@@ -1,0 +1,101 @@
+"""The render engine as Blender sees it. Work is done in final.py and viewport.py."""
+
+from __future__ import annotations
+
+import traceback
+
+import bpy
+
+from . import final, native, output
+from .viewport import Viewport
+
+
+class PharosRenderEngine(bpy.types.RenderEngine):
+    """Blender makes one object a viewport and one a final render, and may do so twice."""
+
+    bl_idname = "PHAROS"
+    bl_label = "Pharos"
+    bl_use_preview = True
+    bl_use_postprocess = True
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self._viewport = None
+
+    def __del__(self):
+        viewport = getattr(self, "_viewport", None)
+        if viewport is not None:
+            viewport.close()
+        parent = super()
+        if hasattr(parent, "__del__"):
+            parent.__del__()
+
+    def update(self, data, depsgraph):
+        """Nothing: the scene is exported where it is rendered."""
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for _, name, _, channels, kind in wanted_passes(renderlayer):
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def render(self, depsgraph):
+        module, problem = native.load()
+        if module is None:
+            self.report({"ERROR"}, f"Pharos: {problem}")
+            return
+        layer = depsgraph.view_layer_eval
+        for _, name, _, channels, _ in wanted_passes(layer):
+            if name not in _BUILT_IN:
+                self.add_pass(name, len(channels), channels, layer=layer.name)
+        try:
+            final.render(self, depsgraph, module)
+        except Exception as error:  # whatever it was, the user must see it
+            traceback.print_exc()
+            self.report({"ERROR"}, f"Pharos: {type(error).__name__}: {error}")
+
+    def view_update(self, context, depsgraph):
+        viewport = self._ensure_viewport()
+        if viewport is not None:
+            viewport.scene_changed(depsgraph)
+
+    def view_draw(self, context, depsgraph):
+        viewport = self._ensure_viewport()
+        if viewport is not None:
+            viewport.draw(self, context, depsgraph)
+
+    def _ensure_viewport(self):
+        module, problem = native.load()
+        if module is None:
+            self.update_stats("Pharos", problem)
+            return None
+        if getattr(self, "_viewport", None) is None:
+            self._viewport = Viewport(module)
+        return self._viewport
+
+
+_BUILT_IN = {"Combined", "Depth", "Normal"}
+
+
+def wanted_passes(view_layer):
+    """Passes beside Combined that a view layer asks for."""
+    switches = {
+        "Depth": view_layer.use_pass_z,
+        "Normal": view_layer.use_pass_normal,
+    }
+    cycles = getattr(view_layer, "cycles", None)
+    denoising = getattr(cycles, "denoising_store_passes", False)
+    own = view_layer.pharos
+    switches["DenoisingNormal"] = switches["DenoisingAlbedo"] = denoising or own.use_pass_denoising
+    counts = getattr(cycles, "pass_debug_sample_count", False)
+    switches["SampleCount"] = counts or own.use_pass_sample_count
+    return [entry for entry in output.PASSES if switches.get(entry[0], False)]
+
+
+def register():
+    bpy.utils.register_class(PharosRenderEngine)
+
+
+def unregister():
+    bpy.utils.unregister_class(PharosRenderEngine)

@@ -1,0 +1,121 @@
+"""Objects of a depsgraph: every geometry once, every place where it stands as an instance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .lights import light_fields
+from .meshes import MESH_TYPES, add_mesh, evaluated_mesh, read_mesh
+from .visibility import Visibility
+
+# Object types that are silently no surfaces.
+_SILENT_TYPES = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
+_UNSUPPORTED_TYPES = {
+    "CURVES": "Hair curves are",
+    "POINTCLOUD": "Point clouds are",
+    "VOLUME": "Volumes are",
+    "GPENCIL": "Grease pencil objects are",
+    "GREASEPENCIL": "Grease pencil objects are",
+}
+
+
+class Cancelled(Exception):
+    """The user stopped the export."""
+
+
+class InstanceExporter:
+    """Walks depsgraph.object_instances once; nothing of an instance outlives its step there."""
+
+    def __init__(self, context):
+        self._context = context
+        self._native = context.native
+        self._visibility = Visibility(context.native, context.view_layer, context.report)
+        self._meshes: dict[tuple, int | None] = {}
+        self._names: list[str] = []
+        self._rows: list[tuple[int, int, int, int]] = []  # place in depsgraph, mesh, set, bits
+
+    def run(self) -> None:
+        instances = self._context.depsgraph.object_instances
+        matrices = np.empty((len(instances), 16), np.float32)
+        if len(instances):
+            instances.foreach_get("matrix_world", matrices.ravel())
+        for place, instance in enumerate(instances):
+            if self._context.should_stop():
+                raise Cancelled
+            if instance.show_self:
+                self._visit(instance, place)
+        self._add_rows(matrices)
+
+    def _visit(self, instance, place: int) -> None:
+        obj = instance.object
+        if obj.type == "LIGHT":
+            self._add_light(instance)
+        elif obj.type in MESH_TYPES:
+            self._add_surface(instance, place)
+        elif obj.type not in _SILENT_TYPES:
+            what = _UNSUPPORTED_TYPES.get(obj.type, f"Objects of type {obj.type} are")
+            self._context.report.warn(obj.name, f"{what} not supported.")
+        if instance.show_particles:
+            self._name_hair(obj)
+
+    def _name_hair(self, obj) -> None:
+        for system in obj.particle_systems:
+            settings = system.settings
+            if settings.type == "HAIR" and settings.render_type == "PATH":
+                self._context.report.warn(obj.name, f"Hair {system.name!r} is not supported.")
+
+    def _add_light(self, instance) -> None:
+        obj = instance.object
+        fields = light_fields(self._native, obj.data, self._context.report)
+        if fields is not None:
+            self._context.description.add_light(
+                name=obj.name,
+                to_world=[list(row) for row in instance.matrix_world],
+                visibility=self._visibility.of(instance),
+                **fields,
+            )
+
+    def _add_surface(self, instance, place: int) -> None:
+        obj = instance.object
+        bits = self._visibility.of(instance)
+        if not bits:
+            return
+        material_set, uses_uv = self._context.materials.set_of(obj)
+        mesh = self._mesh_index(instance, uses_uv)
+        if mesh is not None:
+            self._names.append(obj.name)
+            self._rows.append((place, mesh, material_set, bits))
+
+    def _mesh_index(self, instance, uses_uv: bool) -> int | None:
+        obj = instance.object
+        owner = instance.instance_object if instance.is_instance else obj
+        # Instances of what is not a mesh are converted each for itself: only the owner tells them
+        # apart, as the iterator's own object is a temporary one.
+        own = 0 if obj.type == "MESH" else (owner or obj).original.as_pointer()
+        slots = len(obj.material_slots)
+        key = (obj.data.as_pointer(), own, uses_uv, slots)
+        if key not in self._meshes:
+            self._meshes[key] = self._read(obj, slots, uses_uv)
+        return self._meshes[key]
+
+    def _read(self, obj, slots: int, uses_uv: bool) -> int | None:
+        with evaluated_mesh(obj) as mesh:
+            if mesh is None:
+                return None
+            arrays = read_mesh(mesh, slots, uses_uv)
+            if arrays is None:
+                return None
+            self._context.progress(obj.name)
+            return add_mesh(self._native, self._context.description, obj.data.name, arrays)
+
+    def _add_rows(self, matrices: np.ndarray) -> None:
+        if not self._rows:
+            return
+        rows = np.array(self._rows, np.uint32)
+        self._context.description.add_instances(
+            names=self._names,
+            matrices=matrices[rows[:, 0]],
+            meshes=rows[:, 1],
+            material_sets=rows[:, 2],
+            visibility=rows[:, 3],
+        )

@@ -1,0 +1,180 @@
+"""Flattens the node trees of materials and worlds into node programs.
+
+Value nodes become operations, shader nodes closures with weights: Mix Shader multiplies its factor
+into the weights of what it mixes. What is not known is named in the report; its output takes the
+socket's own value.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .node_closures import CLOSURES
+from .node_values import VALUES
+from .program import ProgramBuilder, Value
+from .tree import Scope, Source, Unlinked, input_by_identifier, resolve
+
+_SCALARS = {"VALUE", "INT", "BOOLEAN"}
+
+
+class Flattened(NamedTuple):
+    """A node program and what the meshes that use it must bring along."""
+
+    program: object
+    uses_uv: bool
+
+
+class Flattener:
+    """One node tree on its way to a program: the context that node handlers work in."""
+
+    def __init__(self, native, images, report, owner: str, is_world: bool = False):
+        self.native = native
+        self.images = images
+        self.report = report
+        self.owner = owner
+        self.is_world = is_world
+        self.program = ProgramBuilder(native)
+        self.image_values: dict[tuple, Value] = {}  # image nodes: colour and alpha at once
+        self._values: dict[tuple, Value] = {}
+        self._under_way: set[tuple] = set()
+
+    def warn(self, message: str) -> None:
+        self.report.warn(self.owner, message)
+
+    def unsupported(self, node, what: str = "") -> None:
+        name = node.label or node.name
+        self.warn(f"Node {name!r} ({node.bl_label}){what and ': ' + what} is not supported.")
+
+    # Inputs.
+
+    def input(self, node, scope: Scope, identifier: str, size: int) -> Value:
+        """An input as a scalar (size 1) or a colour or vector (size 3)."""
+        socket = input_by_identifier(node, identifier)
+        if socket is None:
+            return self.program.constant(*([0.0] * size))
+        return self._socket_value(resolve(socket, scope), size)
+
+    def linked(self, node, scope: Scope, identifier: str) -> bool:
+        socket = input_by_identifier(node, identifier)
+        return socket is not None and isinstance(resolve(socket, scope), Source)
+
+    def normal(self, node, scope: Scope, identifier: str = "Normal") -> Value:
+        """A normal or tangent; the surface's own where nothing is linked."""
+        if self.linked(node, scope, identifier):
+            return self.input(node, scope, identifier, 3)
+        return self.program.default_normal
+
+    def _socket_value(self, origin: Source | Unlinked, size: int) -> Value:
+        if isinstance(origin, Unlinked):
+            value = self._default(origin.socket)
+            is_color = origin.socket.type == "RGBA"
+        else:
+            value = self._output(origin)
+            is_color = origin.socket.type == "RGBA"
+        if size == 1:
+            return self.program.to_scalar(value, is_color)
+        return self.program.to_vector(value)
+
+    def _default(self, socket) -> Value:
+        value = getattr(socket, "default_value", 0.0)
+        if socket.type in _SCALARS:
+            return self.program.constant(value)
+        if socket.type in {"RGBA", "VECTOR"}:
+            return self.program.constant(*value[:3])
+        return self.program.constant(0.0)
+
+    # Values.
+
+    def _output(self, source: Source) -> Value:
+        node, socket, scope = source
+        key = (scope.path, node.name, socket.identifier)
+        if key in self._values:
+            return self._values[key]
+        if key in self._under_way:
+            self.unsupported(node, "a ring of links")
+            return self._default(socket)
+        self._under_way.add(key)
+        handler = VALUES.get(node.bl_idname)
+        value = handler(self, node, scope, socket) if handler is not None else None
+        self._under_way.discard(key)
+        if value is None:
+            self.unsupported(node, "" if handler is None else f"output {socket.name!r}")
+            value = self._default(socket)
+        self._values[key] = value
+        return value
+
+    # Closures.
+
+    def shader(self, node, scope: Scope, identifier: str, weight: Value) -> None:
+        """Append the closures behind a shader socket; `weight` is a scalar."""
+        socket = input_by_identifier(node, identifier)
+        if socket is not None and weight.known != (0.0,):
+            self.closures(resolve(socket, scope), weight)
+
+    def closures(self, origin: Source | Unlinked, weight: Value) -> None:
+        if isinstance(origin, Unlinked):
+            return
+        node, socket, scope = origin
+        if socket.type != "SHADER":
+            # A colour where a shader is expected emits.
+            color = self._socket_value(origin, 3)
+            self.closure("Emission", weight, [color, self.program.constant(1.0)])
+            return
+        handler = CLOSURES.get(node.bl_idname)
+        if handler is not None:
+            handler(self, node, scope, weight)
+            return
+        self.unsupported(node)
+        color = input_by_identifier(node, "Color") or input_by_identifier(node, "Base Color")
+        if color is not None:
+            value = self._socket_value(resolve(color, scope), 3)
+            roughness = self.program.constant(0.0)
+            self.closure("Diffuse", weight, [value, roughness, self.program.default_normal])
+
+    def closure(self, code: str, weight: Value, operands, mode: int = 0) -> None:
+        if weight.known != (0.0,):
+            self.program.closure(code, [self.program.to_vector(weight), *operands], mode)
+
+    def flatten(self, tree, surface: str = "Surface") -> Flattened:
+        """The closures behind the tree's active output."""
+        output = tree.get_output_node("CYCLES")
+        if output is not None:
+            scope = Scope(tree)
+            for other in ("Volume", "Displacement"):
+                if self.linked(output, scope, other):
+                    self.warn(f"{other} is not supported.")
+            self.shader(output, scope, surface, self.program.constant(1.0))
+        return self.result()
+
+    def result(self) -> Flattened:
+        return Flattened(self.program.build(), self.program.uses_uv)
+
+
+def flatten_material(native, images, report, material) -> Flattened:
+    flattener = Flattener(native, images, report, material.name)
+    if material.use_nodes and material.node_tree is not None:
+        return flattener.flatten(material.node_tree)
+    program = flattener.program
+    flattener.closure(
+        "Diffuse",
+        program.constant(1.0),
+        [
+            program.constant(*material.diffuse_color[:3]),
+            program.constant(0.0),
+            program.default_normal,
+        ],
+    )
+    return flattener.result()
+
+
+def flatten_world(native, images, report, world) -> Flattened:
+    flattener = Flattener(native, images, report, world.name, is_world=True)
+    if world.use_nodes and world.node_tree is not None:
+        return flattener.flatten(world.node_tree)
+    program = flattener.program
+    flattener.closure(
+        "Background",
+        program.constant(1.0),
+        [program.constant(*world.color[:3]), program.constant(1.0)],
+    )
+    return flattener.result()

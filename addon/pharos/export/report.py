@@ -1,0 +1,36 @@
+"""What a scene holds that Pharos cannot render as given."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Entry(NamedTuple):
+    severity: str  # INFO, WARNING or ERROR
+    object: str
+    message: str
+
+
+class Report:
+    """Entries in order of discovery, each once."""
+
+    def __init__(self):
+        self._entries: dict[Entry, None] = {}
+
+    def add(self, severity: str, name: str, message: str) -> None:
+        self._entries[Entry(severity, name, message)] = None
+
+    def warn(self, name: str, message: str) -> None:
+        self.add("WARNING", name, message)
+
+    def info(self, name: str, message: str) -> None:
+        self.add("INFO", name, message)
+
+    def add_native(self, entries) -> None:
+        """Entries of a render session."""
+        for entry in entries:
+            self.add(entry.severity.name.upper(), entry.object, entry.message)
+
+    @property
+    def entries(self) -> list[Entry]:
+        return list(self._entries)

@@ -1,0 +1,80 @@
+"""What happens outside of a render: reports reach their scenes, a dump asked for on the command line
+is written once the file is loaded.
+
+Renders may run on threads that must not write to Blender's data, so their reports wait here for a
+timer on the main thread; in background mode there is no other thread and they are written at once.
+"""
+
+from __future__ import annotations
+
+import queue
+import sys
+
+import bpy
+from bpy.app.handlers import persistent
+
+_waiting: queue.SimpleQueue = queue.SimpleQueue()
+_DUMP_ARGUMENT = "--pharos-dump"
+_RENDER_ARGUMENTS = {"-f", "--render-frame", "-a", "--render-anim"}
+
+
+def write_report(scene, entries) -> None:
+    """Replace a scene's report where it has changed."""
+    report = scene.pharos.report
+    if [(e.severity, e.object, e.message) for e in report] == [tuple(e) for e in entries]:
+        return
+    report.clear()
+    for entry in entries:
+        item = report.add()
+        item.severity, item.object, item.message = entry
+
+
+def post_report(scene_name: str, entries) -> None:
+    """Hand a report to the scene of that name, from any thread."""
+    _waiting.put((scene_name, entries))
+    if bpy.app.background:
+        _deliver()
+
+
+def _deliver() -> float:
+    while not _waiting.empty():
+        scene_name, entries = _waiting.get()
+        scene = bpy.data.scenes.get(scene_name)
+        if scene is not None:
+            write_report(scene, entries)
+    return 0.5
+
+
+def dump_argument() -> str:
+    """FILE of `-- --pharos-dump FILE`; empty without."""
+    own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if _DUMP_ARGUMENT in own:
+        place = own.index(_DUMP_ARGUMENT) + 1
+        return own[place] if place < len(own) else ""
+    return ""
+
+
+def _renders_by_argument() -> bool:
+    ours = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
+    return any(argument in _RENDER_ARGUMENTS for argument in sys.argv[:ours])
+
+
+@persistent
+def _dump_after_load(*_):
+    path = dump_argument()
+    if path:
+        bpy.ops.pharos.dump(filepath=path)
+
+
+def register():
+    if not bpy.app.background:
+        bpy.app.timers.register(_deliver, first_interval=0.5, persistent=True)
+    elif dump_argument() and not _renders_by_argument():
+        bpy.app.handlers.load_post.append(_dump_after_load)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(_deliver):
+        bpy.app.timers.unregister(_deliver)
+    if _dump_after_load in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(_dump_after_load)

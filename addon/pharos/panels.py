@@ -1,0 +1,415 @@
+"""Panels: our own, and Blender's usual ones that make sense with Pharos."""
+
+import bpy
+
+from . import native
+
+_ENGINE = "PHAROS"
+
+# Blender's panels for its own engines that would show settings Pharos does not read.
+_EXCLUDED = {
+    "DATA_PT_area",
+    "DATA_PT_camera_dof",
+    "DATA_PT_falloff_curve",
+    "DATA_PT_light",
+    "DATA_PT_shadow",
+    "DATA_PT_spot",
+    "DATA_PT_sunsky",
+    "MATERIAL_PT_diffuse",
+    "MATERIAL_PT_flare",
+    "MATERIAL_PT_halo",
+    "MATERIAL_PT_mirror",
+    "MATERIAL_PT_options",
+    "MATERIAL_PT_pipeline",
+    "MATERIAL_PT_preview",
+    "MATERIAL_PT_shading",
+    "MATERIAL_PT_shadow",
+    "MATERIAL_PT_specular",
+    "MATERIAL_PT_sss",
+    "MATERIAL_PT_strand",
+    "MATERIAL_PT_transp",
+    "MATERIAL_PT_volume_density",
+    "MATERIAL_PT_volume_integration",
+    "MATERIAL_PT_volume_lighting",
+    "MATERIAL_PT_volume_options",
+    "MATERIAL_PT_volume_shading",
+    "MATERIAL_PT_volume_transp",
+    "RENDER_PT_freestyle",
+    "RENDER_PT_gpencil",
+    "RENDER_PT_simplify",
+    "SCENE_PT_simplify",
+    "TEXTURE_PT_envmap",
+    "VIEWLAYER_PT_filter",
+    "VIEWLAYER_PT_layer_passes",
+    "VIEWLAYER_PT_freestyle",
+    "VIEWLAYER_PT_freestyle_edge_detection",
+    "VIEWLAYER_PT_freestyle_lineset",
+    "VIEWLAYER_PT_freestyle_linestyle",
+    "VIEWLAYER_PT_freestyle_style_modules",
+    "WORLD_PT_ambient_occlusion",
+    "WORLD_PT_environment_lighting",
+    "WORLD_PT_gather",
+    "WORLD_PT_indirect_lighting",
+    "WORLD_PT_mist",
+    "WORLD_PT_preview",
+    "WORLD_PT_world",
+}
+# Panels of other engines that Pharos understands wholly.
+_ADOPTED = {
+    "DATA_PT_camera_dof",
+    "DATA_PT_camera_dof_aperture",
+    "DATA_PT_lens",
+    "MATERIAL_PT_preview",
+    "WORLD_PT_preview",
+    "RENDER_PT_color_management",
+}
+
+
+class _PharosPanel:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    COMPAT_ENGINES = {_ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+
+class _RenderPanel(_PharosPanel):
+    bl_context = "render"
+
+
+class PHAROS_RENDER_PT_problem(_RenderPanel, bpy.types.Panel):
+    """Why nothing can be rendered."""
+
+    bl_label = "Pharos cannot render"
+    bl_order = 0
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and native.load().module is None
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.alert = True
+        words = native.load().problem.split()
+        line, icon = "", "ERROR"
+        for word in [*words, None]:
+            if word is None or len(line) + len(word) > 48:
+                column.label(text=line, icon=icon)
+                line, icon = "", "BLANK1"
+            line = f"{line} {word}".strip()
+
+
+class PHAROS_RENDER_PT_sampling(_RenderPanel, bpy.types.Panel):
+    bl_label = "Sampling"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.pharos
+        layout.prop(settings, "follow_cycles")
+        own = layout.column()
+        own.active = not settings.follow_cycles
+        own.prop(settings, "samples")
+        own.prop(settings, "preview_samples", text="Viewport")
+        own.prop(settings, "seed")
+        layout.prop(settings, "time_limit")
+        layout.prop(settings, "guiding")
+        layout.prop(settings, "use_nee")
+
+
+class PHAROS_RENDER_PT_bounces(_RenderPanel, bpy.types.Panel):
+    bl_label = "Light Paths"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.pharos
+        layout.active = not settings.follow_cycles
+        column = layout.column(align=True)
+        for name in ("max", "diffuse", "glossy", "transmission", "transparent"):
+            column.prop(settings, f"{name}_bounces")
+        column = layout.column(heading="Caustics", align=True)
+        column.prop(settings, "caustics_reflective", text="Reflective")
+        column.prop(settings, "caustics_refractive", text="Refractive")
+
+
+class PHAROS_RENDER_PT_film(_RenderPanel, bpy.types.Panel):
+    bl_label = "Film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.pharos
+        own = layout.column()
+        own.active = not settings.follow_cycles
+        own.prop(settings, "exposure")
+        own.prop(settings, "pixel_filter", text="Filter")
+        if settings.pixel_filter != "BOX":
+            own.prop(settings, "filter_width")
+        layout.prop(context.scene.render, "film_transparent", text="Transparent")
+
+
+class PHAROS_RENDER_PT_performance(_RenderPanel, bpy.types.Panel):
+    bl_label = "Performance"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        render = context.scene.render
+        layout.prop(render, "threads_mode")
+        if render.threads_mode == "FIXED":
+            layout.prop(render, "threads")
+
+
+class PHAROS_RENDER_PT_report(_RenderPanel, bpy.types.Panel):
+    """What of this scene is not rendered as given."""
+
+    bl_label = "Report"
+    bl_options = {"DEFAULT_CLOSED"}
+    _ICONS = {"INFO": "INFO", "WARNING": "ERROR", "ERROR": "CANCEL"}
+    _SHOWN = 50
+
+    def draw(self, context):
+        layout = self.layout
+        report = context.scene.pharos.report
+        if not report:
+            layout.label(text="Everything is rendered as given.", icon="CHECKMARK")
+        column = layout.column(align=True)
+        for entry in report[: self._SHOWN]:
+            column.label(text=f"{entry.object}: {entry.message}", icon=self._ICONS[entry.severity])
+        if len(report) > self._SHOWN:
+            column.label(text=f"{len(report) - self._SHOWN} more")
+        layout.operator("pharos.dump", icon="EXPORT")
+
+
+class PHAROS_VIEW_LAYER_PT_passes(_PharosPanel, bpy.types.Panel):
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        view_layer = context.view_layer
+        column = layout.column(heading="Data", align=True)
+        column.prop(view_layer, "use_pass_z", text="Depth")
+        column.prop(view_layer, "use_pass_normal", text="Normal")
+        column.prop(view_layer.pharos, "use_pass_denoising")
+        column.prop(view_layer.pharos, "use_pass_sample_count")
+
+
+def draw_node_socket(layout, owner, output_type: str, socket: str) -> None:
+    """The tree behind an output's socket, as a list of nested settings."""
+    layout.use_property_split = True
+    output = owner.node_tree.get_output_node("CYCLES")
+    if output is None:
+        layout.label(text=f"No {output_type} node")
+    else:
+        layout.template_node_view(owner.node_tree, output, output.inputs[socket])
+
+
+class PHAROS_MATERIAL_PT_slots(_PharosPanel, bpy.types.Panel):
+    bl_label = ""
+    bl_context = "material"
+    bl_options = {"HIDE_HEADER"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and (context.object or context.material)
+
+    def draw(self, context):
+        layout = self.layout
+        obj, slot, space = context.object, context.material_slot, context.space_data
+        if obj is None:
+            layout.template_ID(space, "pin_id")
+            return
+        if len(obj.material_slots) > 0:
+            row = layout.row()
+            row.template_list(
+                "MATERIAL_UL_matslots", "", obj, "material_slots", obj, "active_material_index"
+            )
+            column = row.column(align=True)
+            column.operator("object.material_slot_add", icon="ADD", text="")
+            column.operator("object.material_slot_remove", icon="REMOVE", text="")
+        if obj.mode == "EDIT":
+            row = layout.row(align=True)
+            row.operator("object.material_slot_assign", text="Assign")
+            row.operator("object.material_slot_select", text="Select")
+            row.operator("object.material_slot_deselect", text="Deselect")
+        row = layout.row()
+        row.template_ID(obj, "active_material", new="material.new")
+        if slot is not None:
+            row.prop(slot, "link", text="")
+
+
+class PHAROS_MATERIAL_PT_surface(_PharosPanel, bpy.types.Panel):
+    bl_label = "Surface"
+    bl_context = "material"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.material is not None
+
+    def draw(self, context):
+        layout, material = self.layout, context.material
+        layout.prop(material, "use_nodes", icon="NODETREE")
+        layout.separator()
+        if material.use_nodes:
+            draw_node_socket(layout, material, "Material Output", "Surface")
+        else:
+            layout.use_property_split = True
+            layout.prop(material, "diffuse_color", text="Base Color")
+
+
+class PHAROS_WORLD_PT_surface(_PharosPanel, bpy.types.Panel):
+    bl_label = "Surface"
+    bl_context = "world"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world is not None
+
+    def draw(self, context):
+        layout, world = self.layout, context.world
+        layout.prop(world, "use_nodes", icon="NODETREE")
+        layout.separator()
+        if world.use_nodes:
+            draw_node_socket(layout, world, "World Output", "Surface")
+        else:
+            layout.use_property_split = True
+            layout.prop(world, "color")
+
+
+class PHAROS_LIGHT_PT_light(_PharosPanel, bpy.types.Panel):
+    bl_label = "Light"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light is not None
+
+    def draw(self, context):
+        layout, light = self.layout, context.light
+        layout.row().prop(light, "type", expand=True)
+        layout.use_property_split = True
+        column = layout.column()
+        for name in ("color", "use_temperature", "temperature", "energy", "exposure"):
+            if hasattr(light, name) and (name != "temperature" or light.use_temperature):
+                column.prop(light, name)
+        if hasattr(light, "normalize"):
+            column.prop(light, "normalize")
+        self._draw_shape(layout.column(), light)
+        self._draw_flags(layout.column(), light)
+
+    @staticmethod
+    def _draw_shape(column, light):
+        if light.type in {"POINT", "SPOT"}:
+            if hasattr(light, "use_soft_falloff"):
+                column.prop(light, "use_soft_falloff")
+            column.prop(light, "shadow_soft_size", text="Radius")
+        if light.type == "SPOT":
+            column.prop(light, "spot_size", text="Spot Size")
+            column.prop(light, "spot_blend", text="Blend", slider=True)
+        if light.type == "SUN":
+            column.prop(light, "angle")
+        if light.type == "AREA":
+            column.prop(light, "shape")
+            two_sizes = light.shape in {"RECTANGLE", "ELLIPSE"}
+            column.prop(light, "size", text="Size X" if two_sizes else "Size")
+            if two_sizes:
+                column.prop(light, "size_y", text="Y")
+            column.prop(light, "spread")
+
+    @staticmethod
+    def _draw_flags(column, light):
+        settings = getattr(light, "cycles", None)
+        if hasattr(settings, "cast_shadow"):
+            column.prop(settings, "cast_shadow")
+        else:
+            column.prop(light, "use_shadow", text="Cast Shadow")
+        if hasattr(settings, "use_multiple_importance_sampling"):
+            column.prop(settings, "use_multiple_importance_sampling", text="Multiple Importance")
+
+
+class PHAROS_LIGHT_PT_nodes(_PharosPanel, bpy.types.Panel):
+    bl_label = "Nodes"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light is not None
+
+    def draw(self, context):
+        layout, light = self.layout, context.light
+        layout.prop(light, "use_nodes", icon="NODETREE")
+        if light.use_nodes:
+            draw_node_socket(layout, light, "Light Output", "Surface")
+
+
+class PHAROS_OBJECT_PT_visibility(_PharosPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object is not None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column()
+        for name in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+            column.prop(context.object, f"visible_{name}", text=name.capitalize())
+
+
+_CLASSES = (
+    PHAROS_RENDER_PT_problem,
+    PHAROS_RENDER_PT_sampling,
+    PHAROS_RENDER_PT_bounces,
+    PHAROS_RENDER_PT_film,
+    PHAROS_RENDER_PT_performance,
+    PHAROS_RENDER_PT_report,
+    PHAROS_VIEW_LAYER_PT_passes,
+    PHAROS_MATERIAL_PT_slots,
+    PHAROS_MATERIAL_PT_surface,
+    PHAROS_WORLD_PT_surface,
+    PHAROS_LIGHT_PT_light,
+    PHAROS_LIGHT_PT_nodes,
+    PHAROS_OBJECT_PT_visibility,
+)
+
+
+def compatible_panels():
+    """Panels of Blender that also show for Pharos."""
+    for panel in bpy.types.Panel.__subclasses__():
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        if engines is None:
+            continue
+        name = panel.__name__
+        usual = "BLENDER_RENDER" in engines and name not in _EXCLUDED
+        if usual or name in _ADOPTED:
+            yield panel
+
+
+def register():
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    for panel in compatible_panels():
+        panel.COMPAT_ENGINES.add(_ENGINE)
+
+
+def unregister():
+    for panel in compatible_panels():
+        panel.COMPAT_ENGINES.discard(_ENGINE)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)
