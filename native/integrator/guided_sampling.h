@@ -51,11 +51,13 @@ struct ScatteringRandom {
     BsdfSample sample;
     sample.wi = sample_mixture(*guide.mixture, u.guide / guide.share, u.direction);
     const BsdfEval scattering = eval_bsdf(bsdf, sample.wi);
-    if (!(scattering.pdf > 0.0f)) {
-        return std::nullopt;
+    if (scattering.pdf > 0.0f) {
+        sample.f_cos = scattering.f_cos;
+        sample.pdf = guided_pdf(guide, scattering.pdf, sample.wi);
+    } else {
+        sample.pdf =
+            guide.share * (1.0f - guide.delta_probability) * mixture_pdf(*guide.mixture, sample.wi);
     }
-    sample.f_cos = scattering.f_cos;
-    sample.pdf = guided_pdf(guide, scattering.pdf, sample.wi);
     sample.lobe = guided_lobe(bsdf, u.closure, sample.wi);
     return sample;
 }

@@ -43,6 +43,7 @@ void BatchStatistics::add(const BatchStatistics& other) {
 struct Integrator::Worker {
     PathBatch batch{kBatchPaths};
     BatchStatistics statistics;
+    RecordBuffer records;
 };
 
 Integrator::Integrator(const Scene& scene, ThreadPool& pool)
@@ -88,6 +89,9 @@ void Integrator::render_batch(const RenderContext& context,
         timed(statistics, Stage::AddEmittedRadiance, [&] {
             return add_emitted_radiance(context, batch);
         });
+        timed(statistics, Stage::QueryGuidingField, [&] {
+            return query_guiding_field(context, batch);
+        });
         timed(statistics, Stage::SampleDirectLight, [&] {
             return sample_direct_light(context, batch);
         });
@@ -97,13 +101,30 @@ void Integrator::render_batch(const RenderContext& context,
         timed(
             statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
     }
+    timed(statistics, Stage::RecordRadiance, [&] {
+        return record_radiance(context, batch, worker.records);
+    });
     statistics.nonfinite += finish_paths(batch);
 }
 
+RecordBuffer Integrator::take_records() {
+    RecordBuffer all;
+    for (const auto& worker : workers_) {
+        RecordBuffer& own = worker->records;
+        all.radiance.insert(all.radiance.end(), own.radiance.begin(), own.radiance.end());
+        all.selection.insert(all.selection.end(), own.selection.begin(), own.selection.end());
+        all.recorded_paths += own.recorded_paths;
+        all.variance_sum += own.variance_sum;
+        own.clear();
+    }
+    return all;
+}
+
 bool Integrator::render_pass(const PassSettings& pass,
+                             const GuidingContext& guiding,
                              SharedFilm& film,
                              const StopCondition& stop) {
-    const RenderContext context{scene_, camera_, filter_, pass};
+    const RenderContext context{scene_, camera_, filter_, pass, guiding};
     const std::uint32_t pixels = film.film.width() * film.film.height();
     std::atomic<bool> complete{true};
     // A batch is a run of pixels with all of the pass' samples, one after the other.

@@ -48,7 +48,13 @@ class Integrator {
     ~Integrator();
 
     // Renders a pass; false when it was stopped before its end (finished batches are in the film).
-    bool render_pass(const PassSettings& pass, SharedFilm& film, const StopCondition& stop);
+    bool render_pass(const PassSettings& pass,
+                     const GuidingContext& guiding,
+                     SharedFilm& film,
+                     const StopCondition& stop);
+
+    // What the last pass recorded, gathered from all threads (unordered: sort by key).
+    [[nodiscard]] RecordBuffer take_records();
 
     [[nodiscard]] std::uint32_t batches_per_sample() const;
 

@@ -1,6 +1,7 @@
 // Weights between next-event estimation and chance hits, in one place for every stage.
 #pragma once
 
+#include "core/color.h"
 #include "integrator/path_batch.h"
 #include "integrator/render_context.h"
 #include "sampling/mis.h"
@@ -22,6 +23,30 @@ namespace pharos {
 [[nodiscard]] inline const LightSampleContext* rival_context(const PathBatch& batch,
                                                              std::uint32_t path) {
     return batch.scatter_pdf[path] > 0.0f ? &batch.origin[path] : nullptr;
+}
+
+inline void add_radiance(PathBatch& batch, std::uint32_t path, const Rgb& contribution) {
+    batch.radiance[path] += contribution;
+    if (batch.split_scale[path] > 0.0f) {
+        batch.recorded_radiance[path] += contribution * batch.split_scale[path];
+    }
+}
+
+// Adds emission L met by chance to a path, and tells the record of the scattering that met it.
+inline void add_chance_hit(const RenderContext& context,
+                           PathBatch& batch,
+                           std::uint32_t path,
+                           const Rgb& L,
+                           float light_pdf) {
+    const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
+    const Rgb contribution = batch.beta[path] * L * weight;
+    add_radiance(batch, path, contribution);
+    if (batch.last_record[path] != kNone) {
+        VertexRecord& record = batch.records[batch.last_record[path]];
+        record.hit_weighted += contribution * batch.split_scale[path];
+        record.selection.hit_radiance += luminance(record.f_cos * L);
+        record.selection.hit_pdf_light = context.settings().use_nee ? light_pdf : 0.0f;
+    }
 }
 
 }  // namespace pharos

@@ -2,9 +2,10 @@
 
 namespace pharos {
 
-PathBatch::PathBatch(std::uint32_t size) : capacity(size) {
-    root_pixel.resize(size);
-    root_sample.resize(size);
+PathBatch::PathBatch(std::uint32_t root_count) : capacity(2 * root_count), max_roots(root_count) {
+    const std::uint32_t size = capacity;
+    root_pixel.resize(max_roots);
+    root_sample.resize(max_roots);
     root.resize(size);
     sampler_hash.resize(size);
     sample_index.resize(size);
@@ -15,6 +16,9 @@ PathBatch::PathBatch(std::uint32_t size) : capacity(size) {
     origin.resize(size);
     counters.resize(size);
     path_visibility.resize(size);
+    last_record.resize(size);
+    split_scale.resize(size);
+    recorded_radiance.resize(size);
     for (auto* list : {&active,
                        &visibility,
                        &next_active,

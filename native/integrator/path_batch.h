@@ -6,6 +6,7 @@
 // them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -13,6 +14,9 @@
 #include "film/film.h"
 #include "geometry/accelerator.h"
 #include "geometry/surface_interaction.h"
+#include "guiding/directional_mixture.h"
+#include "integrator/guided_sampling.h"
+#include "integrator/path_record.h"
 #include "lights/light.h"
 #include "materials/material.h"
 
@@ -37,6 +41,7 @@ struct PathCounters {
 struct ShadowRay {
     Rgb contribution{0.0f};
     std::uint32_t path = 0;
+    std::uint32_t record = kNone;  // vertex record that wants to know
 };
 
 // Light samples whose radiance a node program gives.
@@ -47,9 +52,11 @@ struct PendingLight {
 };
 
 struct PathBatch {
-    explicit PathBatch(std::uint32_t capacity);
+    // `roots` camera samples, and as many again for split paths.
+    explicit PathBatch(std::uint32_t max_roots);
 
     std::uint32_t capacity;
+    std::uint32_t max_roots;
     std::uint32_t roots = 0;  // in use
     std::uint32_t paths = 0;  // in use; the first `roots` paths are the roots' own
 
@@ -70,6 +77,10 @@ struct PathBatch {
     std::vector<std::uint32_t>
         path_visibility;  // bit of the last scattering that was not transparent
 
+    std::vector<std::uint32_t> last_record;  // completed record of the last scattering, else kNone
+    std::vector<float> split_scale;  // recorded paths: copies made so far, else 0 = not recorded
+    std::vector<Rgb> recorded_radiance;  // of recorded paths: as if the copies were this one
+
     // --- rays, parallel to active ---
     std::vector<std::uint32_t> active;
     std::vector<Ray> rays;
@@ -87,6 +98,14 @@ struct PathBatch {
     ClosureBatch closures;
     std::vector<Bsdf> bsdfs;
     std::vector<BsdfTraits> traits;
+
+    // --- guiding, parallel to surfaces (empty while guiding is off) ---
+    std::vector<Guide> guides;
+    std::vector<std::uint32_t> vertex_record;  // open record of the surface, else kNone
+    std::vector<std::uint32_t> query_surface;  // the surfaces the field is asked about
+    std::array<std::vector<float>, 6> query;   // their positions and normals
+    std::vector<VmfMixture> mixtures;          // the answers
+    std::vector<VertexRecord> records;         // of the whole batch
 
     // --- rays that left the scene ---
     std::vector<std::uint32_t> escaped;  // indices into active

@@ -7,6 +7,7 @@
 
 #include "camera/camera.h"
 #include "film/filter.h"
+#include "integrator/guiding_context.h"
 #include "scene/scene.h"
 
 namespace pharos {
@@ -23,6 +24,7 @@ struct RenderContext {
     const Camera& camera;
     const FilterSampler& filter;
     PassSettings pass;
+    GuidingContext guiding;
 
     [[nodiscard]] const RenderSettings& settings() const { return scene.description.settings; }
 };
@@ -39,6 +41,7 @@ enum class Stage : std::uint8_t {
     SampleDirectLight,
     TraceShadowRays,
     SampleScattering,
+    RecordRadiance,
     AccumulateFilm,
     Train,
     Count
@@ -55,6 +58,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Stage::Co
     "sample_direct_light",
     "trace_shadow_rays",
     "sample_scattering",
+    "record_radiance",
     "accumulate_film",
     "train"};
 

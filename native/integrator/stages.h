@@ -39,6 +39,9 @@ std::uint64_t evaluate_materials(const RenderContext& context, PathBatch& batch)
 // Emission of surfaces hit by chance, weighted against next-event estimation.
 std::uint64_t add_emitted_radiance(const RenderContext& context, PathBatch& batch);
 
+// One inference for all vertices that the guide serves or that are recorded.
+std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch);
+
 // Next-event estimation: one light a vertex, into batch.shadow_rays.
 std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch);
 
@@ -47,6 +50,9 @@ std::uint64_t trace_shadow_rays(const RenderContext& context, PathBatch& batch);
 
 // Samples the next direction, plays roulette and replaces the active paths by those that go on.
 std::uint64_t sample_scattering(const RenderContext& context, PathBatch& batch);
+
+// Turns the records of the batch's paths into training data.
+std::uint64_t record_radiance(const RenderContext& context, PathBatch& batch, RecordBuffer& buffer);
 
 // Drops and counts non-finite radiance: the number of dropped samples.
 std::uint64_t finish_paths(PathBatch& batch);

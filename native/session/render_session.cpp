@@ -139,7 +139,7 @@ void RenderSession::Impl::render(const Scene& scene) {
     std::uint32_t done = 0;
     while (done < settings.samples) {
         const PassSettings pass = next_pass(done, settings.samples, pixels);
-        if (!integrator.render_pass(pass, *shared_film, stop)) {
+        if (!integrator.render_pass(pass, {}, *shared_film, stop)) {
             finish_pass(integrator, done, process_cpu_seconds() - cpu_begin);
             return;
         }

@@ -24,8 +24,7 @@ std::uint64_t add_emitted_radiance(const RenderContext& context, PathBatch& batc
             light_pdf = scene.lights->pdf_triangle(
                 *rival, surface.instance, surface.triangle, t, cos_light);
         }
-        const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
-        batch.radiance[path] += batch.beta[path] * emission * weight;
+        add_chance_hit(context, batch, path, emission, light_pdf);
         ++items;
     }
     return items;

@@ -35,8 +35,7 @@ void add_world(const RenderContext& context, PathBatch& batch) {
         const float light_pdf = sampled && rival
                                     ? scene.lights->pdf_environment(*rival, batch.rays[i].direction)
                                     : 0.0f;
-        const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
-        batch.radiance[path] += batch.beta[path] * batch.escaped_radiance[k] * weight;
+        add_chance_hit(context, batch, path, batch.escaped_radiance[k], light_pdf);
     }
 }
 
@@ -51,8 +50,7 @@ void add_suns(const RenderContext& context, PathBatch& batch) {
             const auto hit =
                 lights.sun_hit(sun, batch.rays[i].direction, rival_context(batch, path));
             if (hit && (hit->visibility & batch.visibility[i])) {
-                const float weight = chance_hit_weight(context, batch.scatter_pdf[path], hit->pdf);
-                batch.radiance[path] += batch.beta[path] * hit->L * weight;
+                add_chance_hit(context, batch, path, hit->L, hit->pdf);
             }
         }
     }

@@ -29,8 +29,7 @@ std::uint64_t add_lamp_radiance(const RenderContext& context, PathBatch& batch) 
                 break;
             }
             if (hit->visibility & batch.visibility[i]) {
-                const float weight = chance_hit_weight(context, batch.scatter_pdf[path], hit->pdf);
-                batch.radiance[path] += batch.beta[path] * hit->L * weight;
+                add_chance_hit(context, batch, path, hit->L, hit->pdf);
             }
             ray.t_min = std::nextafter(hit->distance, kInfinity);
         }

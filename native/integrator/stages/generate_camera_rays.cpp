@@ -3,12 +3,27 @@
 
 namespace pharos {
 
+namespace {
+
+constexpr std::uint32_t kRecordSalt = 0x9b1a3f77u;
+
+// A random share of the camera samples is recorded, whole paths at a time.
+[[nodiscard]] bool is_recorded(const GuidingContext& guiding,
+                               std::uint32_t hash,
+                               std::uint32_t sample) {
+    return guiding.record && bits_to_unit_float(hash_combine(hash ^ kRecordSalt, sample)) <
+                                 guiding.record_probability;
+}
+
+}  // namespace
+
 std::uint64_t generate_camera_rays(const RenderContext& context,
                                    const BatchWork& work,
                                    PathBatch& batch) {
     const FilmDescription& film = context.scene.description.film;
     batch.roots = work.pixels;
     batch.paths = work.pixels;
+    batch.records.clear();
     batch.active.clear();
     batch.rays.clear();
     batch.visibility.clear();
@@ -33,6 +48,9 @@ std::uint64_t generate_camera_rays(const RenderContext& context,
         batch.scatter_pdf[path] = 0.0f;
         batch.counters[path] = PathCounters{};
         batch.path_visibility[path] = kVisibleCamera;
+        batch.last_record[path] = kNone;
+        batch.recorded_radiance[path] = Rgb(0.0f);
+        batch.split_scale[path] = is_recorded(context.guiding, hash, work.sample) ? 1.0f : 0.0f;
         batch.active.push_back(path);
         batch.rays.push_back(context.camera.generate_ray(raster, Vec2(u.z, u.w)));
         batch.visibility.push_back(kVisibleCamera);

@@ -22,6 +22,21 @@ SurfaceInteraction point_on_emitter(const Scene& scene,
     return scene.interaction(ray, hit);
 }
 
+// Densities at the light's direction, for judging what guiding would change (selection.h).
+void note_light_sample(const Guide& guide,
+                       const LightSample& sample,
+                       float bsdf_pdf,
+                       float mis_weight,
+                       VertexRecord& record) {
+    record.nee_scale = sample.pdf / mis_weight;
+    record.selection.nee_pdf_light = sample.pdf;
+    if (!sample.delta && bsdf_pdf > 0.0f && guide.mixture != nullptr) {
+        record.selection.nee_pdf_bsdf = bsdf_pdf;
+        record.selection.nee_pdf_guide =
+            (1.0f - guide.delta_probability) * mixture_pdf(*guide.mixture, sample.wi);
+    }
+}
+
 struct Receiver {
     std::size_t surface = 0;
     std::uint32_t path = 0;
@@ -48,7 +63,10 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
     if (is_zero(scattering.f_cos)) {
         return;
     }
-    const float weight = sample.delta ? 1.0f : power_heuristic(sample.pdf, scattering.pdf);
+    const Guide guide = batch.guides.empty() ? Guide{} : batch.guides[receiver.surface];
+    const float weight =
+        sample.delta ? 1.0f
+                     : power_heuristic(sample.pdf, guided_pdf(guide, scattering.pdf, sample.wi));
     const Rgb factor = batch.beta[receiver.path] * scattering.f_cos * (weight / sample.pdf);
 
     Ray ray;
@@ -70,7 +88,12 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
         batch.pending_triangles.push_back(
             {point_on_emitter(scene, *light, ray), sample.wi, shadow});
     }
-    batch.shadow_rays.push_back({factor * L, receiver.path});
+    const std::uint32_t record =
+        batch.guides.empty() ? kNone : batch.vertex_record[receiver.surface];
+    if (record != kNone) {
+        note_light_sample(guide, sample, scattering.pdf, weight, batch.records[record]);
+    }
+    batch.shadow_rays.push_back({factor * L, receiver.path, record});
     if (!sample.cast_shadow) {
         ray.t_max = 0.0f;  // an empty interval is never occluded
     }

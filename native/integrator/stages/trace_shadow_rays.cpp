@@ -1,4 +1,6 @@
+#include "core/color.h"
 #include "geometry/ray_offset.h"
+#include "integrator/mis.h"
 #include "integrator/stages.h"
 
 namespace pharos {
@@ -6,7 +8,13 @@ namespace pharos {
 namespace {
 
 void add_contribution(PathBatch& batch, const ShadowRay& shadow) {
-    batch.radiance[shadow.path] += shadow.contribution;
+    add_radiance(batch, shadow.path, shadow.contribution);
+    if (shadow.record != kNone) {
+        VertexRecord& record = batch.records[shadow.record];
+        record.selection.nee_radiance =
+            record.nee_scale *
+            luminance(divide_or_zero(shadow.contribution, batch.beta[shadow.path]));
+    }
 }
 
 // Scenes without transparent materials: any hit blocks.

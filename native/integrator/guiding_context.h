@@ -1,0 +1,46 @@
+// What a pass knows of the guide: the frozen field, where it is used, and what is recorded. All
+// null and false when guiding is off: the stages then skip it without a look at any path.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "guiding/guiding_field.h"
+#include "guiding/roulette.h"
+#include "guiding/selection.h"
+
+namespace pharos {
+
+struct GuidingContext {
+    const GuidingField* field = nullptr;        // null: the field has nothing to say yet
+    const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
+    float fixed_share = 0.0f;
+    bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
+    bool record = false;
+    float record_probability = 0.0f;  // of a camera sample
+    bool roulette = false;            // weight window where the guide is on
+    WeightWindow window;
+    std::span<const float> pixel_estimate;  // luminance per pixel of the window; empty: none yet
+
+    [[nodiscard]] bool active() const { return field != nullptr || record; }
+};
+
+// What the paths of a pass teach, one buffer a thread; order is restored by the records' keys.
+struct RecordBuffer {
+    std::vector<RadianceRecord> radiance;
+    std::vector<SelectionRecord> selection;
+    std::uint64_t recorded_paths = 0;
+    std::uint64_t variance_sum = 0;  // of kVarianceUnit: whole numbers add up alike in any order
+
+    static constexpr double kVarianceUnit = 1.0 / (1 << 20);
+
+    void clear() {
+        radiance.clear();
+        selection.clear();
+        recorded_paths = 0;
+        variance_sum = 0;
+    }
+};
+
+}  // namespace pharos

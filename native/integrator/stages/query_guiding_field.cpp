@@ -1,0 +1,164 @@
+#include "core/color.h"
+#include "integrator/stages.h"
+
+namespace pharos {
+
+namespace {
+
+// Roughness under which a lobe is left to itself: the product with a learned field could only blur
+// it.
+constexpr float kMinGuidedRoughness = 0.05f;
+constexpr float kMinGuidedAlpha = kMinGuidedRoughness * kMinGuidedRoughness;
+// Under this roughness the mixture is multiplied by the reflecting lobe (prototype2, section 2).
+constexpr float kMaxProductRoughness = 0.25f;
+constexpr float kMaxProductAlpha = kMaxProductRoughness * kMaxProductRoughness;
+
+struct LobeSummary {
+    float guidable = 0.0f;  // share of the sample weight that a guide can serve
+    float glossy = 0.0f;    // of that, in reflecting microfacet lobes
+    const Closure* dominant = nullptr;
+};
+
+[[nodiscard]] bool is_microfacet(ClosureType type) {
+    return type == ClosureType::GgxReflection || type == ClosureType::GgxRefraction ||
+           type == ClosureType::GgxGlass || type == ClosureType::Clearcoat;
+}
+
+[[nodiscard]] LobeSummary summarize(const Bsdf& bsdf) {
+    LobeSummary summary;
+    float largest = 0.0f;
+    for (const Closure& c : bsdf.closures) {
+        if (c.type == ClosureType::Transparent) {
+            continue;
+        }
+        const bool microfacet = is_microfacet(c.type);
+        if (microfacet && std::max(c.alpha_x, c.alpha_y) < kMinGuidedAlpha) {
+            continue;
+        }
+        summary.guidable += c.sample_weight;
+        summary.glossy += microfacet ? c.sample_weight : 0.0f;
+        if (c.sample_weight > largest) {
+            largest = c.sample_weight;
+            summary.dominant = &c;
+        }
+    }
+    if (bsdf.total_sample_weight > 0.0f) {
+        summary.glossy = summary.guidable > 0.0f ? summary.glossy / summary.guidable : 0.0f;
+        summary.guidable /= bsdf.total_sample_weight;
+    }
+    return summary;
+}
+
+// The axis and width of the lobe that the mixture is multiplied by, for a narrow dominant
+// reflection.
+void multiply_by_reflection(const Bsdf& bsdf, VmfMixture& mixture) {
+    const Closure* lobe = summarize(bsdf).dominant;
+    if (lobe == nullptr || lobe->type != ClosureType::GgxReflection) {
+        return;
+    }
+    const float alpha = std::sqrt(lobe->alpha_x * lobe->alpha_y);
+    const float cos_o = glm::dot(lobe->n, bsdf.wo);
+    if (alpha > kMaxProductAlpha || cos_o <= 0.0f) {
+        return;
+    }
+    const Vec3 axis = lobe->n * (2.0f * cos_o) - bsdf.wo;
+    mixture = multiply_lobe(mixture, axis, product_kappa(alpha, cos_o));
+}
+
+// Opens a record for a vertex of a recorded path.
+std::uint32_t open_record(const RenderContext& context,
+                          std::size_t s,
+                          bool glossy,
+                          PathBatch& batch) {
+    const std::uint32_t path = batch.surface_path[s];
+    VertexRecord record;
+    record.path = path;
+    record.vertex = batch.counters[path].depth;
+    record.selection.position = batch.surfaces[s].p;
+    record.selection.normal = batch.surfaces[s].ns;
+    record.selection.glossy = glossy;
+    record.smooth_probability = 1.0f - batch.traits[s].delta_probability;
+    record.split_scale = batch.split_scale[path];
+    if (!context.guiding.pixel_estimate.empty()) {
+        const float pixel = context.guiding.pixel_estimate[batch.root_pixel[batch.root[path]]];
+        record.selection.weight = sqr(luminance(batch.beta[path]) * record.split_scale / pixel);
+    }
+    batch.records.push_back(record);
+    return static_cast<std::uint32_t>(batch.records.size() - 1);
+}
+
+void queue_query(std::size_t s, PathBatch& batch) {
+    const SurfaceInteraction& surface = batch.surfaces[s];
+    batch.query_surface.push_back(static_cast<std::uint32_t>(s));
+    for (int axis = 0; axis < 3; ++axis) {
+        batch.query[static_cast<std::size_t>(axis)].push_back(surface.p[axis]);
+        batch.query[static_cast<std::size_t>(axis) + 3].push_back(surface.ns[axis]);
+    }
+}
+
+void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch) {
+    const GuidingContext& guiding = context.guiding;
+    const std::uint32_t path = batch.surface_path[s];
+    Guide& guide = batch.guides[s];
+    guide.delta_probability = batch.traits[s].delta_probability;
+    const bool recorded = batch.split_scale[path] > 0.0f;
+    if (batch.bsdfs[s].total_sample_weight <= 0.0f || batch.counters[path].terminate_at_surface) {
+        return;
+    }
+    const LobeSummary lobes = summarize(batch.bsdfs[s]);
+    if (lobes.guidable < 0.25f) {
+        return;
+    }
+    const bool glossy = lobes.glossy > 0.5f;
+    if (recorded) {
+        batch.vertex_record[s] = open_record(context, s, glossy, batch);
+    }
+    if (guiding.field == nullptr) {
+        return;
+    }
+    const SurfaceInteraction& surface = batch.surfaces[s];
+    guide.share = guiding.selection != nullptr
+                      ? guiding.selection->alpha(surface.p, surface.ns, glossy)
+                      : guiding.fixed_share;
+    if (guide.share > 0.0f || (recorded && guiding.probe)) {
+        queue_query(s, batch);
+    }
+}
+
+}  // namespace
+
+std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch) {
+    if (!context.guiding.active()) {
+        return 0;
+    }
+    const std::size_t count = batch.surfaces.size();
+    batch.guides.assign(count, Guide{});
+    batch.vertex_record.assign(count, kNone);
+    batch.query_surface.clear();
+    for (auto& values : batch.query) {
+        values.clear();
+    }
+    for (std::size_t s = 0; s < count; ++s) {
+        decide_vertex(context, s, batch);
+    }
+    const std::size_t queries = batch.query_surface.size();
+    if (queries == 0) {
+        return 0;
+    }
+    batch.mixtures.resize(queries);
+    const FieldQuery query{batch.query[0],
+                           batch.query[1],
+                           batch.query[2],
+                           batch.query[3],
+                           batch.query[4],
+                           batch.query[5]};
+    context.guiding.field->evaluate(query, batch.mixtures);
+    for (std::size_t q = 0; q < queries; ++q) {
+        const std::uint32_t s = batch.query_surface[q];
+        multiply_by_reflection(batch.bsdfs[s], batch.mixtures[q]);
+        batch.guides[s].mixture = &batch.mixtures[q];
+    }
+    return queries;
+}
+
+}  // namespace pharos
