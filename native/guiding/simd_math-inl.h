@@ -33,7 +33,7 @@ PHAROS_SIMD_INLINE F broadcast(float x) {
 }
 
 template <class Mask, class F>
-PHAROS_SIMD_INLINE F select(Mask mask, const F& a, const F& b) {
+PHAROS_SIMD_INLINE F select(const Mask& mask, const F& a, const F& b) {
     return mask ? a : b;
 }
 

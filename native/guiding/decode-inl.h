@@ -1,0 +1,241 @@
+// From the last layer's rows to mixtures, and from records to the gradient of those rows; included
+// by mlp.cpp once a target, after network-inl.h.
+namespace pharos {
+namespace HWY_NAMESPACE {
+
+inline constexpr float kMinKappa = 1e-2f;
+inline constexpr float kIntegralRange = 15.0f;  // of log A in units of the scale
+
+// center + half * u / sqrt(1 + u^2): slope 1 at the centre, never further than `half` from it.
+struct SmoothLimit {
+    V value;
+    V slope;
+};
+
+PHAROS_SIMD_INLINE SmoothLimit smooth_limit(const V& x, float center, float half) {
+    const V u = (x - center) * (1.0f / half);
+    const V r = 1.0f / simd::sqrt<V>(1.0f + u * u);
+    return {center + half * u * r, r * r * r};
+}
+
+// One mixture a lane. The second half is what the gradient needs besides.
+struct Decoded {
+    V weight[kMaxLobes];
+    V mu[kMaxLobes][3];
+    V kappa[kMaxLobes];
+    V normalization[kMaxLobes];
+    V integral;  // A in units of the scale
+
+    V mu_slope[kMaxLobes][3];     // d activation / d raw
+    V inverse_length[kMaxLobes];  // of the vector before normalising; 0 where it has no direction
+    V log_kappa_slope[kMaxLobes];
+    V log_integral_slope;
+};
+
+[[gnu::always_inline]] inline void decode_weights(const float* rows,
+                                                  int stride,
+                                                  int lobes,
+                                                  Decoded& out) {
+    V largest = load(rows);
+    for (int k = 1; k < lobes; ++k) {
+        largest = simd::max(load(rows + k * stride), largest);
+    }
+    V sum{};
+    for (int k = 0; k < lobes; ++k) {
+        out.weight[k] = simd::exp<V>(load(rows + k * stride) - largest);
+        sum += out.weight[k];
+    }
+    const V inverse = 1.0f / sum;
+    for (int k = 0; k < lobes; ++k) {
+        out.weight[k] *= inverse;
+    }
+}
+
+// Direction: the slides' 2 sigmoid(x) - 1 per axis, or x itself; then normalised. A vector too
+// short to have a direction becomes +z, with gradient zero.
+[[gnu::always_inline]] inline void decode_mu(
+    const float* rows, int stride, bool sigmoid, int k, Decoded& out) {
+    V v[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const V raw = load(rows + axis * stride);
+        if (sigmoid) {
+            const V x =
+                simd::min(simd::max(raw, simd::broadcast<V>(-20.0f)), simd::broadcast<V>(20.0f));
+            v[axis] = 1.0f - 2.0f / (1.0f + simd::exp<V>(x));
+            out.mu_slope[k][axis] = 0.5f - 0.5f * v[axis] * v[axis];
+        } else {
+            v[axis] =
+                simd::min(simd::max(raw, simd::broadcast<V>(-1e4f)), simd::broadcast<V>(1e4f));
+            out.mu_slope[k][axis] = simd::broadcast<V>(1.0f);
+        }
+    }
+    const V length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    const auto none = length2 < 1e-10f;
+    const V inverse = simd::select(
+        none, V{}, 1.0f / simd::sqrt<V>(simd::max(length2, simd::broadcast<V>(1e-10f))));
+    out.inverse_length[k] = inverse;
+    out.mu[k][0] = v[0] * inverse;
+    out.mu[k][1] = v[1] * inverse;
+    out.mu[k][2] = simd::select(none, simd::broadcast<V>(1.0f), v[2] * inverse);
+}
+
+[[gnu::always_inline]] inline void decode_kappa(const V& x,
+                                                const GuidingConfig& config,
+                                                int k,
+                                                Decoded& out) {
+    if (config.kappa == KappaActivation::Exponential) {
+        const float low = __builtin_logf(kMinKappa);
+        const float high = __builtin_logf(config.kappa_max);
+        const SmoothLimit limited = smooth_limit(x, 0.5f * (low + high), 0.5f * (high - low));
+        out.kappa[k] = simd::exp<V>(limited.value);
+        out.log_kappa_slope[k] = limited.slope;
+    } else {
+        // x^2 / (1 + x^2 / max) + min
+        const V raw = simd::min(simd::max(x, simd::broadcast<V>(-1e6f)), simd::broadcast<V>(1e6f));
+        const V shrink = 1.0f / (1.0f + raw * raw * (1.0f / config.kappa_max));
+        out.kappa[k] = raw * raw * shrink + kMinKappa;
+        out.log_kappa_slope[k] = 2.0f * raw * shrink * shrink / out.kappa[k];
+    }
+    out.normalization[k] = vmf::normalization<V>(out.kappa[k]);
+}
+
+// `rows` points at one vector of samples in the last layer's first row.
+inline void decode(const float* rows, int stride, const GuidingConfig& config, Decoded& out) {
+    const int lobes = config.lobes;
+    decode_weights(rows, stride, lobes, out);
+    const bool sigmoid = config.mu == MuActivation::Sigmoid;
+    for (int k = 0; k < lobes; ++k) {
+        decode_mu(rows + (lobes + k) * stride, lobes * stride, sigmoid, k, out);
+        decode_kappa(load(rows + (4 * lobes + k) * stride), config, k, out);
+    }
+    const SmoothLimit limited = smooth_limit(load(rows + 5 * lobes * stride), 0.0f, kIntegralRange);
+    out.integral = simd::exp<V>(limited.value);
+    out.log_integral_slope = limited.slope;
+}
+
+// The mixture's density at wi, and each lobe's part in it.
+struct LobeDensities {
+    V part[kMaxLobes];  // weight * vMF density
+    V chord2[kMaxLobes];
+    V sum;
+};
+
+PHAROS_SIMD_INLINE LobeDensities lobe_densities(const Decoded& mixture, int lobes, const V wi[3]) {
+    LobeDensities out;
+    out.sum = V{};
+    for (int k = 0; k < lobes; ++k) {
+        const V x = wi[0] - mixture.mu[k][0];
+        const V y = wi[1] - mixture.mu[k][1];
+        const V z = wi[2] - mixture.mu[k][2];
+        out.chord2[k] = x * x + y * y + z * z;
+        out.part[k] = mixture.weight[k] * mixture.normalization[k] *
+                      vmf::falloff<V>(mixture.kappa[k], out.chord2[k]);
+        out.sum += out.part[k];
+    }
+    return out;
+}
+
+// What multiplies d log pdf and d log A in a record's gradient, and the loss itself.
+struct LossTerms {
+    V log_pdf;
+    V log_integral;
+    V loss;
+};
+
+// One-sample KL: -w log(pdf), w = min(target / (A + eps), clip) with A held; and half the relative
+// squared error of A with its denominator held (the slides' loss for A).
+PHAROS_SIMD_INLINE LossTerms kl_terms(const GuidingConfig& config,
+                                      const V& integral,
+                                      const V& density,
+                                      const V& target,
+                                      const V& weight) {
+    const V inverse = 1.0f / (integral + kIntegralEpsilon);
+    const V w = weight * simd::min(target * inverse, simd::broadcast<V>(config.weight_clip));
+    const V relative = (integral - target) * inverse;
+    const V raw = 0.5f * integral * inverse * relative;
+    const V limit = simd::broadcast<V>(kGradientLimit);
+    const V slope = simd::min(simd::max(raw, -limit), limit);
+    const V loss = -w * simd::log<V>(density + kDensityFloor) +
+                   weight * simd::min(0.25f * relative * relative, simd::broadcast<V>(1e6f));
+    return {-w, weight * slope, loss};
+}
+
+// The slides' loss: (A pdf - L)^2 / (A pdf)^2, denominator held, importance weighted by 1 / p.
+PHAROS_SIMD_INLINE LossTerms relative_squared_terms(
+    const V& integral, const V& density, const V& target, const V& pdf, const V& weight) {
+    const V field = integral * density;
+    const V radiance = target * pdf;
+    const V inverse = 1.0f / (pdf * (field * field + kFieldEpsilon));
+    const V difference = field - radiance;
+    const V limit = simd::broadcast<V>(kGradientLimit);
+    const V slope = simd::min(simd::max(2.0f * field * difference * inverse, -limit), limit);
+    const V loss = simd::min(difference * difference * inverse, simd::broadcast<V>(1e6f));
+    return {weight * slope, weight * slope, weight * loss};
+}
+
+// Gradient of one vector of records into the last layer's rows (which hold the raw outputs on
+// entry).
+struct RecordVector {
+    V wi[3];
+    V target;
+    V pdf;
+    V weight;
+};
+
+[[gnu::always_inline]] inline void store_lobe_gradient(const Decoded& mixture,
+                                                       const LobeDensities& densities,
+                                                       const RecordVector& record,
+                                                       const V& share_scale,
+                                                       const V& density_share,
+                                                       int k,
+                                                       int lobes,
+                                                       int stride,
+                                                       float* rows) {
+    // rho_k = pi_k p_k / p: the lobe's responsibility (guiding: d log p / d logit_j = rho_j - pi_j)
+    const V responsible = densities.part[k] * share_scale;
+    store(rows + k * stride, responsible - density_share * mixture.weight[k]);
+    const V ratio = mixture.normalization[k] * 12.5663706f;
+    const V dlogkappa = vmf::dlogpdf_dlogkappa<V>(mixture.kappa[k], ratio, densities.chord2[k]);
+    store(rows + (4 * lobes + k) * stride, responsible * dlogkappa * mixture.log_kappa_slope[k]);
+    // d log p / d mu = kappa (e - mu (mu . e)), e = w - mu, then through normalisation and
+    // activation
+    const V* mu = mixture.mu[k];
+    V e[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        e[axis] = record.wi[axis] - mu[axis];
+    }
+    const V along = e[0] * mu[0] + e[1] * mu[1] + e[2] * mu[2];
+    const V scale = responsible * mixture.kappa[k] * mixture.inverse_length[k];
+    for (int axis = 0; axis < 3; ++axis) {
+        store(rows + ((1 + axis) * lobes + k) * stride,
+              scale * (e[axis] - mu[axis] * along) * mixture.mu_slope[k][axis]);
+    }
+}
+
+inline V record_gradient(const GuidingConfig& config,
+                         const RecordVector& record,
+                         float inverse_batch,
+                         int stride,
+                         float* rows) {
+    Decoded mixture;
+    decode(rows, stride, config, mixture);
+    const int lobes = config.lobes;
+    const LobeDensities densities = lobe_densities(mixture, lobes, record.wi);
+    const LossTerms terms =
+        config.loss == GuidingLoss::KullbackLeibler
+            ? kl_terms(config, mixture.integral, densities.sum, record.target, record.weight)
+            : relative_squared_terms(
+                  mixture.integral, densities.sum, record.target, record.pdf, record.weight);
+    const V share_scale = terms.log_pdf * inverse_batch / (densities.sum + kDensityFloor);
+    const V density_share = densities.sum * share_scale;
+    for (int k = 0; k < lobes; ++k) {
+        store_lobe_gradient(
+            mixture, densities, record, share_scale, density_share, k, lobes, stride, rows);
+    }
+    store(rows + 5 * lobes * stride,
+          terms.log_integral * inverse_batch * mixture.log_integral_slope);
+    return terms.loss;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace pharos

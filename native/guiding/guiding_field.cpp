@@ -1,0 +1,62 @@
+#include "guiding/guiding_field.h"
+
+#include "core/check.h"
+#include "guiding/mlp.h"
+#include "guiding/network_state.h"
+#include "guiding/trainer.h"
+
+namespace pharos {
+
+struct GuidingField::Impl {
+    Impl(const GuidingConfig& config, const Bounds3& scene_box)
+        : layout(make_network_layout(config)),
+          state(make_network_state(layout, scene_box)),
+          trainer(layout) {}
+
+    NetworkLayout layout;
+    NetworkState state;
+    Trainer trainer;
+};
+
+GuidingField::GuidingField(const GuidingConfig& config, const Bounds3& scene_box)
+    : impl_(std::make_unique<Impl>(config, scene_box)) {}
+
+GuidingField::~GuidingField() = default;
+GuidingField::GuidingField(GuidingField&&) noexcept = default;
+GuidingField& GuidingField::operator=(GuidingField&&) noexcept = default;
+
+void GuidingField::evaluate(const FieldQuery& query, std::span<VmfMixture> mixtures) const {
+    CHECK_EQ(query.px.size(), mixtures.size());
+    CHECK_EQ(query.py.size(), mixtures.size());
+    CHECK_EQ(query.pz.size(), mixtures.size());
+    CHECK_EQ(query.nx.size(), mixtures.size());
+    CHECK_EQ(query.ny.size(), mixtures.size());
+    CHECK_EQ(query.nz.size(), mixtures.size());
+    evaluate_network(published_view(impl_->layout, impl_->state), query, mixtures);
+}
+
+TrainStatistics GuidingField::train(std::span<const RadianceRecord> records, ThreadPool& pool) {
+    return impl_->trainer.train(impl_->state, records, pool);
+}
+
+void GuidingField::restart_optimizer() {
+    pharos::restart_optimizer(impl_->state);
+}
+
+std::uint64_t GuidingField::generation() const {
+    return impl_->state.generation;
+}
+
+const GuidingConfig& GuidingField::config() const {
+    return impl_->layout.config;
+}
+
+std::vector<std::byte> GuidingField::save() const {
+    return save_state(impl_->layout, impl_->state);
+}
+
+void GuidingField::load(std::span<const std::byte> data) {
+    load_state(impl_->layout, data, impl_->state);
+}
+
+}  // namespace pharos

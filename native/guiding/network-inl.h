@@ -1,0 +1,250 @@
+// Encoding and layers of the network for one instruction set; included by mlp.cpp once a target.
+//
+// Activations lie as rows of kStride samples: [feature][sample]. Every kernel keeps a tile of 4
+// rows x some vectors of samples in registers and broadcasts single weights.
+namespace pharos {
+namespace HWY_NAMESPACE {
+
+using V [[gnu::vector_size(HWY_MAX_BYTES)]] = float;
+inline constexpr int kLanes = HWY_MAX_BYTES / 4;
+
+PHAROS_SIMD_INLINE V load(const float* p) {
+    return *reinterpret_cast<const V*>(p);
+}
+
+[[gnu::always_inline]] inline void store(float* p, const V& v) {
+    *reinterpret_cast<V*>(p) = v;
+}
+
+PHAROS_SIMD_INLINE V finite_or_zero(const V& x) {
+    return simd::select(simd::abs(x) <= 3e38f, x, V{});
+}
+
+// Position over the scene box, raw and with octaves of sine and cosine of (pi / 2) 2^k p by the
+// double-angle recurrence; outside of the box the coordinate stops soon.
+template <int kStride>
+inline void encode_position(const NetworkView& view, const float* const position[3], float* rows) {
+    const int octaves = view.layout->config.octaves;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int s = 0; s < kStride; s += kLanes) {
+            const V centered = finite_or_zero(load(position[axis] + s)) - view.center[axis];
+            const V scaled = centered * view.inverse_half_extent[axis];
+            const V p =
+                simd::min(simd::max(scaled, simd::broadcast<V>(-1.25f)), simd::broadcast<V>(1.25f));
+            store(rows + axis * kStride + s, p);
+            if (octaves > 0) {
+                float* out = rows + (3 + axis * 2 * octaves) * kStride + s;
+                simd::SinCos<V> wave = simd::sincos_turns<V>(0.25f * p);
+                for (int k = 0; k < octaves; ++k) {
+                    store(out + (2 * k) * kStride, wave.sin);
+                    store(out + (2 * k + 1) * kStride, wave.cos);
+                    const V doubled = 2.0f * wave.sin * wave.cos;
+                    wave.cos = 1.0f - 2.0f * wave.sin * wave.sin;
+                    wave.sin = doubled;
+                }
+            }
+        }
+    }
+}
+
+template <int kStride>
+inline void encode_position_grid(const NetworkView& view,
+                                 const float* const position[3],
+                                 float* rows) {
+    const float* table = view.parameters + view.layout->mlp_parameters;
+    for (int s = 0; s < kStride; ++s) {
+        Vec3 p;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float x = position[axis][s];
+            const float scaled = ((std::isfinite(x) ? x : 0.0f) - view.center[axis]) *
+                                 view.inverse_half_extent[axis];
+            p[axis] = std::clamp(scaled, -1.0f, 1.0f);
+        }
+        encode_grid(view.layout->config, table, p, rows + s, kStride);
+    }
+}
+
+template <int kStride>
+inline void encode(const NetworkView& view,
+                   const float* const position[3],
+                   const float* const normal[3],
+                   float* rows) {
+    if (view.layout->config.encoding == Encoding::Frequency) {
+        encode_position<kStride>(view, position, rows);
+    } else {
+        encode_position_grid<kStride>(view, position, rows);
+    }
+    if (view.layout->config.use_normal) {
+        float* out = rows + view.layout->position_inputs * kStride;
+        for (int axis = 0; axis < 3; ++axis) {
+            for (int s = 0; s < kStride; s += kLanes) {
+                const V n = finite_or_zero(load(normal[axis] + s));
+                const V limited =
+                    simd::min(simd::max(n, simd::broadcast<V>(-1.0f)), simd::broadcast<V>(1.0f));
+                store(out + axis * kStride + s, limited);
+            }
+        }
+    }
+}
+
+// Vectors of samples in a register tile: 16 accumulators with 32 registers, 8 with 16.
+inline constexpr int kForwardVectors = HWY_MAX_BYTES == 64 ? 4 : 2;
+
+// y = activation(W x + b); slope 1 is the identity.
+template <int kStride>
+inline void layer_forward(const LayerShape& shape,
+                          const float* parameters,
+                          float slope,
+                          const float* __restrict x,
+                          float* __restrict y) {
+    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
+    const int inputs = shape.inputs;
+    const float* bias = parameters + shape.biases;
+    for (int row = 0; row < shape.rows; row += kRowTile) {
+        const float* weight = parameters + shape.weights + row * inputs;
+        for (int s = 0; s < kStride; s += kVectors * kLanes) {
+            V sum[kRowTile][kVectors];
+#pragma GCC unroll 16
+            for (int i = 0; i < kRowTile; ++i) {
+#pragma GCC unroll 16
+                for (int v = 0; v < kVectors; ++v) {
+                    sum[i][v] = simd::broadcast<V>(bias[row + i]);
+                }
+            }
+            const float* input = x + s;
+            for (int k = 0; k < inputs; ++k, input += kStride) {
+#pragma GCC unroll 16
+                for (int v = 0; v < kVectors; ++v) {
+                    const V in = load(input + v * kLanes);
+#pragma GCC unroll 16
+                    for (int i = 0; i < kRowTile; ++i) {
+                        sum[i][v] += weight[i * inputs + k] * in;
+                    }
+                }
+            }
+#pragma GCC unroll 16
+            for (int i = 0; i < kRowTile; ++i) {
+#pragma GCC unroll 16
+                for (int v = 0; v < kVectors; ++v) {
+                    // slope < 1: the larger of the two is the leaky ReLU
+                    const V out = simd::max(sum[i][v], slope * sum[i][v]);
+                    store(y + (row + i) * kStride + s + v * kLanes, out);
+                }
+            }
+        }
+    }
+}
+
+// dx = W^T dy, times the slope where the activation x (an output of the layer below) is negative.
+template <int kStride>
+inline void layer_backward_inputs(const LayerShape& shape,
+                                  const float* parameters,
+                                  float slope,
+                                  const float* __restrict dy,
+                                  const float* __restrict x,
+                                  float* __restrict dx) {
+    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
+    const int inputs = shape.inputs;
+    for (int k = 0; k < inputs; k += kRowTile) {
+        const int count = std::min(kRowTile, inputs - k);
+        for (int s = 0; s < kStride; s += kVectors * kLanes) {
+            V sum[kRowTile][kVectors] = {};
+            const float* weight = parameters + shape.weights + k;
+            if (count == kRowTile) {
+                for (int row = 0; row < shape.outputs; ++row, weight += inputs) {
+#pragma GCC unroll 16
+                    for (int v = 0; v < kVectors; ++v) {
+                        const V in = load(dy + row * kStride + s + v * kLanes);
+#pragma GCC unroll 16
+                        for (int i = 0; i < kRowTile; ++i) {
+                            sum[i][v] += weight[i] * in;
+                        }
+                    }
+                }
+            } else {
+                for (int row = 0; row < shape.outputs; ++row, weight += inputs) {
+                    for (int v = 0; v < kVectors; ++v) {
+                        const V in = load(dy + row * kStride + s + v * kLanes);
+                        for (int i = 0; i < count; ++i) {
+                            sum[i][v] += weight[i] * in;
+                        }
+                    }
+                }
+            }
+            for (int i = 0; i < count; ++i) {
+                for (int v = 0; v < kVectors; ++v) {
+                    const int at = (k + i) * kStride + s + v * kLanes;
+                    const V factor = simd::select(
+                        load(x + at) > 0.0f, simd::broadcast<V>(1.0f), simd::broadcast<V>(slope));
+                    store(dx + at, sum[i][v] * factor);
+                }
+            }
+        }
+    }
+}
+
+PHAROS_SIMD_INLINE float sum_lanes(const V& v) {
+    // Halving in a fixed order.
+    float lanes[kLanes];
+    __builtin_memcpy(lanes, &v, sizeof(v));
+    for (int half = kLanes / 2; half > 0; half /= 2) {
+        for (int i = 0; i < half; ++i) {
+            lanes[i] += lanes[i + half];
+        }
+    }
+    return lanes[0];
+}
+
+// Gradients of weights and biases: sums over the samples of dy x^T and dy.
+template <int kStride>
+inline void layer_backward_weights(const LayerShape& shape,
+                                   const float* __restrict dy,
+                                   const float* __restrict x,
+                                   float* __restrict gradient) {
+    constexpr int kColumns = HWY_MAX_BYTES == 64 ? 4 : 2;
+    const int inputs = shape.inputs;
+    for (int row = 0; row < shape.rows; row += kRowTile) {
+        const float* out = dy + row * kStride;
+        float* row_gradient = gradient + shape.weights + row * inputs;
+        int k = 0;
+        for (; k + kColumns <= inputs; k += kColumns) {
+            V sum[kRowTile][kColumns] = {};
+            for (int s = 0; s < kStride; s += kLanes) {
+#pragma GCC unroll 16
+                for (int c = 0; c < kColumns; ++c) {
+                    const V in = load(x + (k + c) * kStride + s);
+#pragma GCC unroll 16
+                    for (int i = 0; i < kRowTile; ++i) {
+                        sum[i][c] += load(out + i * kStride + s) * in;
+                    }
+                }
+            }
+#pragma GCC unroll 16
+            for (int i = 0; i < kRowTile; ++i) {
+#pragma GCC unroll 16
+                for (int c = 0; c < kColumns; ++c) {
+                    row_gradient[i * inputs + k + c] = sum_lanes(sum[i][c]);
+                }
+            }
+        }
+        for (; k < inputs; ++k) {
+            for (int i = 0; i < kRowTile; ++i) {
+                V sum{};
+                for (int s = 0; s < kStride; s += kLanes) {
+                    sum += load(out + i * kStride + s) * load(x + k * kStride + s);
+                }
+                row_gradient[i * inputs + k] = sum_lanes(sum);
+            }
+        }
+        for (int i = 0; i < kRowTile; ++i) {
+            V sum{};
+            for (int s = 0; s < kStride; s += kLanes) {
+                sum += load(out + i * kStride + s);
+            }
+            gradient[shape.biases + static_cast<std::size_t>(row + i)] = sum_lanes(sum);
+        }
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace pharos
