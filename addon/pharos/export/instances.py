@@ -80,6 +80,7 @@ class InstanceExporter:
         bits = self._visibility.of(instance)
         if not bits:
             return
+        self._visibility.name_unsupported(obj)
         material_set, uses_uv = self._context.materials.set_of(obj)
         mesh = self._mesh_index(instance, uses_uv)
         if mesh is not None:

@@ -31,13 +31,16 @@ class Visibility:
         bits = sum(bit for name, bit in self._bits if getattr(obj, name))
         if self._asks_indirect and obj.indirect_only_get(view_layer=self._view_layer):
             bits &= ~self._camera_bit
+        return bits
+
+    def name_unsupported(self, obj) -> None:
+        """Report what a surface should do besides hiding from rays."""
         if obj.is_holdout or (
             self._asks_holdout and obj.holdout_get(view_layer=self._view_layer)
         ):
             self._report.warn(obj.name, "Holdout is not supported.")
         if obj.is_shadow_catcher:
             self._report.warn(obj.name, "Shadow catcher is not supported.")
-        return bits
 
     def of(self, instance) -> int:
         """Bits of a depsgraph instance: an instancer hides what it instances."""
