@@ -107,6 +107,12 @@ void Integrator::render_batch(const RenderContext& context,
     statistics.nonfinite += finish_paths(batch);
 }
 
+void Integrator::book_training(std::uint64_t records, std::uint64_t nanoseconds) {
+    training_.items += records;
+    training_.nanoseconds += nanoseconds;
+    total_[Stage::Train] = training_;
+}
+
 RecordBuffer Integrator::take_records() {
     RecordBuffer all;
     for (const auto& worker : workers_) {
@@ -154,6 +160,7 @@ bool Integrator::render_pass(const PassSettings& pass,
     for (const auto& worker : workers_) {
         total_.add(worker->statistics);
     }
+    total_[Stage::Train] = training_;
     return complete.load();
 }
 

@@ -56,6 +56,9 @@ class Integrator {
     // What the last pass recorded, gathered from all threads (unordered: sort by key).
     [[nodiscard]] RecordBuffer take_records();
 
+    // Counts training done between passes among the stages.
+    void book_training(std::uint64_t records, std::uint64_t nanoseconds);
+
     [[nodiscard]] std::uint32_t batches_per_sample() const;
 
     [[nodiscard]] const BatchStatistics& statistics() const { return total_; }
@@ -72,6 +75,7 @@ class Integrator {
     Camera camera_;
     FilterSampler filter_;
     std::vector<std::unique_ptr<Worker>> workers_;
+    StageCounter training_;
     BatchStatistics total_;
 };
 

@@ -13,6 +13,7 @@
 #include "core/fp_state.h"
 #include "integrator/integrator.h"
 #include "scene/scene.h"
+#include "session/guide_controller.h"
 #include "session/pass_schedule.h"
 
 namespace pharos {
@@ -53,6 +54,12 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
+// Where a render stands at the end of a pass.
+struct PassEnd {
+    std::uint32_t samples = 0;
+    double cpu_seconds = 0.0;
+};
+
 struct RenderSession::Impl {
     CancelFlag cancel;
     unsigned threads = 0;
@@ -75,7 +82,13 @@ struct RenderSession::Impl {
 
     void run(SceneDescription description);
     void render(const Scene& scene);
-    void finish_pass(const Integrator& integrator, std::uint32_t samples, double cpu_seconds);
+    void learn(GuideController& guide,
+               Integrator& integrator,
+               const BatchStatistics& before,
+               ThreadPool& pool);
+    void finish_pass(const Integrator& integrator,
+                     const GuideController& guide,
+                     const PassEnd& end);
     void end(SessionState state, const std::string& error);
 
     [[nodiscard]] bool is_ended() const { return progress.state >= SessionState::Finished; }
@@ -136,15 +149,23 @@ void RenderSession::Impl::render(const Scene& scene) {
     }
     const double cpu_begin = process_cpu_seconds();
     StopCondition stop{cancel, std::nullopt};
+    GuideController guide(settings.guiding, scene.bounds, pixels);
     std::uint32_t done = 0;
     while (done < settings.samples) {
-        const PassSettings pass = next_pass(done, settings.samples, pixels);
-        if (!integrator.render_pass(pass, {}, *shared_film, stop)) {
-            finish_pass(integrator, done, process_cpu_seconds() - cpu_begin);
+        PassSettings pass = next_pass(done, settings.samples, pixels);
+        if (guide.learning()) {
+            pass.samples = 1;
+        }
+        // By the number of the sample, so that a pass of several keeps the rule.
+        pass.weight = guide.status().enabled ? pass_weight(done) : 1.0;
+        const BatchStatistics before = integrator.statistics();
+        if (!integrator.render_pass(pass, guide.next_pass(), *shared_film, stop)) {
+            finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
             return;
         }
         done += pass.samples;
-        finish_pass(integrator, done, process_cpu_seconds() - cpu_begin);
+        learn(guide, integrator, before, pool);
+        finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
         if (settings.time_limit > 0.0f) {
             // Only after the first pass: every pixel has a sample by then.
             stop.deadline = begin + std::chrono::duration_cast<Clock::duration>(
@@ -156,16 +177,35 @@ void RenderSession::Impl::render(const Scene& scene) {
     }
 }
 
+void RenderSession::Impl::learn(GuideController& guide,
+                                Integrator& integrator,
+                                const BatchStatistics& before,
+                                ThreadPool& pool) {
+    if (!guide.learning()) {
+        return;
+    }
+    const BatchStatistics& after = integrator.statistics();
+    SelectionPass work;
+    work.paths = static_cast<double>(after.camera_samples - before.camera_samples);
+    work.vertices = static_cast<double>(after.vertices - before.vertices);
+    RecordBuffer records = integrator.take_records();
+    const std::uint64_t items = records.radiance.size();
+    const Clock::time_point begin = Clock::now();
+    guide.learn(std::move(records), work, film->film, pool);
+    integrator.book_training(items, static_cast<std::uint64_t>(1e9 * seconds_since(begin)));
+}
+
 void RenderSession::Impl::finish_pass(const Integrator& integrator,
-                                      std::uint32_t samples,
-                                      double cpu_seconds) {
+                                      const GuideController& guide,
+                                      const PassEnd& pass_end) {
     const BatchStatistics& batch = integrator.statistics();
     const double noise = [&] {
         const std::shared_lock film_lock(film->mutex);
         return film->film.noise();
     }();
     const std::lock_guard lock(mutex);
-    progress.samples = samples;
+    progress.samples = pass_end.samples;
+    progress.guiding = guide.status();
     progress.noise = noise;
     progress.nonfinite_samples = batch.nonfinite;
     statistics.stages.clear();
@@ -177,10 +217,10 @@ void RenderSession::Impl::finish_pass(const Integrator& integrator,
     statistics.camera_samples = batch.camera_samples;
     statistics.vertices = batch.vertices;
     statistics.rays = batch.rays;
-    statistics.render_cpu_seconds = cpu_seconds;
+    statistics.render_cpu_seconds = pass_end.cpu_seconds;
     while (snapshots.size() < snapshot_samples.size() &&
-           snapshot_samples[snapshots.size()] <= samples) {
-        SessionSnapshot snapshot{samples, cpu_seconds, {}};
+           snapshot_samples[snapshots.size()] <= pass_end.samples) {
+        SessionSnapshot snapshot{pass_end.samples, pass_end.cpu_seconds, {}};
         snapshot.combined.resize(std::size_t{width} * height * 4);
         film->film.read(FilmPass::Combined, snapshot.combined);
         snapshots.push_back(std::move(snapshot));

@@ -15,6 +15,7 @@
 #include "core/scene_report.h"
 #include "film/film.h"
 #include "scene/scene_description.h"
+#include "session/guide_status.h"
 
 namespace pharos {
 
@@ -32,6 +33,7 @@ struct SessionProgress {
     double noise = 1.0;              // Film::noise()
     std::uint64_t memory_bytes = 0;  // scene and film
     std::uint64_t nonfinite_samples = 0;
+    GuideStatus guiding;
 };
 
 // Work per stage, for --stats and the benchmarks.
