@@ -9,6 +9,7 @@
 #include "core/cancel.h"
 #include "core/scene_report.h"
 #include "geometry/accelerator.h"
+#include "geometry/instance_surface.h"
 #include "image/texture.h"
 #include "lights/environment_light.h"
 #include "lights/light_sampler.h"
@@ -24,30 +25,34 @@ struct SceneNeeds {
     bool emissive_triangles = false;  // and is sampled by next-event estimation
     bool environment = false;         // the world is not black
     bool constant_environment = false;
-    bool transparency = false;        // some material lets shadow rays through
+    bool transparency = false;  // some material lets shadow rays through
     bool textures = false;
-    bool all_constant = false;        // no material runs a node program
-    bool nee = false;                 // there is something to sample
+    bool all_constant = false;  // no material runs a node program
+    bool nee = false;           // there is something to sample
 };
 
 struct Scene {
-    SceneDescription description;  // meshes, camera, film, settings (images' pixels are moved out)
-    std::vector<Instance> instances;
-    std::vector<Material> materials;  // one per description.materials, then the grey default
+    SceneDescription description;     // mended; programs, pixels and bytes of images are moved out
+    std::vector<Instance> instances;  // those that can be shown, in the description's order
+    std::vector<InstanceSurface> surfaces;  // of each instance
+    std::vector<Bounds3> mesh_bounds;       // object space
+    std::vector<Material> materials;        // one per description.materials, then the grey default
     std::vector<Texture> textures;
     Material world;
     Rgb constant_world{0.0f};
     std::unique_ptr<EnvironmentLight> environment;
     std::unique_ptr<LightSampler> lights;
     std::unique_ptr<Accelerator> accelerator;
-    Bounds3 bounds;
+    Bounds3 bounds;  // of everything there is to hit; the unit cube for nothing
     SceneNeeds needs;
     ShadingContext shading;  // spans into this scene
 
     // Hit to interaction: position with its error bound, normals on wo's side, material.
-    [[nodiscard]] SurfaceInteraction interaction(const Ray& ray, const Hit& hit) const;
+    [[nodiscard]] SurfaceInteraction interaction(const Ray& ray, const Hit& hit) const {
+        return surface_interaction(surfaces[hit.instance], ray, hit);
+    }
 
-    [[nodiscard]] std::uint64_t bytes() const;
+    [[nodiscard]] std::uint64_t bytes() const;  // held in memory, about
 };
 
 // Validates, reports and mends the description and builds everything a render needs. Polls `cancel`

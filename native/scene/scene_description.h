@@ -1,5 +1,6 @@
 // The whole input of a render as plain data: what the add-on fills, a dump file holds, and
-// build_scene() turns into a Scene. No pointers, no library types; indices refer to the vectors here.
+// build_scene() turns into a Scene. No pointers, no library types; indices refer to the vectors
+// here.
 //
 // Units: metres, watts, radians, scene-linear Rec.709. Matrices are object to world, affine.
 // Any value may be wrong (it is user input): build_scene() reports and works around it.
@@ -35,7 +36,7 @@ struct MaterialDescription {
 };
 
 struct WorldDescription {
-    NodeProgram program;  // emission along the ray's direction; empty: black
+    NodeProgram program;               // emission along the ray's direction; empty: black
     std::uint32_t map_resolution = 0;  // width of the importance map; 0: from the images, else 1024
     bool use_mis = true;
     std::uint32_t visibility = kVisibleAll;
@@ -62,7 +63,8 @@ struct SceneDescription {
     std::uint32_t blender_version = 304;  // major * 100 + minor: formulas of the look follow it
     std::vector<Mesh> meshes;
     std::vector<MaterialDescription> materials;
-    std::vector<std::vector<std::uint32_t>> material_sets;  // material of each slot; kNone: grey default
+    std::vector<std::vector<std::uint32_t>>
+        material_sets;  // material of each slot; kNone: grey default
     std::vector<InstanceDescription> instances;
     std::vector<ImageDescription> images;
     std::vector<LightDescription> lights;
