@@ -19,7 +19,7 @@ struct Surface {
     std::size_t dropped = 0;
 };
 
-using Setup = std::function<void(const ClosureSetupContext&, ClosureSink&)>;
+using SurfaceSetup = std::function<void(const ClosureSetupContext&, ClosureSink&)>;
 
 inline ClosureSetupContext make_context(const Vec3& wo, std::uint32_t version) {
     ClosureSetupContext ctx;
@@ -31,7 +31,9 @@ inline ClosureSetupContext make_context(const Vec3& wo, std::uint32_t version) {
 }
 
 // Fills `surface`, which must stay where it is while its bsdf is used.
-inline const Bsdf& build(Surface& surface, const ClosureSetupContext& ctx, const Setup& setup) {
+inline const Bsdf& build(Surface& surface,
+                         const ClosureSetupContext& ctx,
+                         const SurfaceSetup& setup) {
     ClosureSink sink(surface.storage);
     setup(ctx, sink);
     surface.bsdf = {sink.closures(), ctx.wo, ctx.ng, sink.total_sample_weight()};
@@ -73,7 +75,7 @@ inline AlbedoEstimate sampled_albedo(const Bsdf& bsdf, int count, std::uint64_t 
 // One kind of lobe with random, ordinary parameters: roughness in [roughness_min, 1].
 struct LobeCase {
     std::string name;
-    std::function<Setup(Random&, float roughness_min)> make;
+    std::function<SurfaceSetup(Random&, float roughness_min)> make;
 };
 
 inline ScatterInputs random_scatter(Random& r, float roughness_min, Distribution distribution) {
@@ -130,7 +132,7 @@ inline PrincipledV2Inputs random_principled_v2(Random& r, float roughness_min) {
 inline std::vector<LobeCase> lobe_cases() {
     using Node = void (*)(const ScatterInputs&, const ClosureSetupContext&, ClosureSink&);
     const auto node = [](Node setup, Distribution distribution) {
-        return [setup, distribution](Random& r, float roughness_min) -> Setup {
+        return [setup, distribution](Random& r, float roughness_min) -> SurfaceSetup {
             const ScatterInputs in = random_scatter(r, roughness_min, distribution);
             return [in, setup](const ClosureSetupContext& ctx, ClosureSink& sink) {
                 setup(in, ctx, sink);
@@ -146,13 +148,13 @@ inline std::vector<LobeCase> lobe_cases() {
         {"glass multi", node(setup_glass, Distribution::MultiGgx)},
         {"refraction", node(setup_refraction, Distribution::Ggx)},
     };
-    cases.push_back({"principled v1", [](Random& r, float roughness_min) -> Setup {
+    cases.push_back({"principled v1", [](Random& r, float roughness_min) -> SurfaceSetup {
                          const PrincipledV1Inputs in = random_principled_v1(r, roughness_min);
                          return [in](const ClosureSetupContext& ctx, ClosureSink& sink) {
                              setup_principled_v1(in, ctx, sink);
                          };
                      }});
-    cases.push_back({"principled v2", [](Random& r, float roughness_min) -> Setup {
+    cases.push_back({"principled v2", [](Random& r, float roughness_min) -> SurfaceSetup {
                          const PrincipledV2Inputs in = random_principled_v2(r, roughness_min);
                          return [in](const ClosureSetupContext& ctx, ClosureSink& sink) {
                              static_cast<void>(setup_principled_v2(in, ctx, sink));
