@@ -10,6 +10,12 @@ float finite_or(float value, float fallback) {
     return std::isfinite(value) ? value : fallback;
 }
 
+// Unit vector of the part of v at right angles to `axis`; zero where there is none.
+Vec3 across(const Vec3& axis, const Vec3& v) {
+    const Vec3 unit = normalize_or(v, Vec3(0.0f));
+    return normalize_or(unit - axis * glm::dot(unit, axis), Vec3(0.0f));
+}
+
 bool usable_window(const CameraDescription& d) {
     const Vec2 size = d.window_upper - d.window_lower;
     const float sum = d.window_lower.x + d.window_lower.y + size.x + size.y;
@@ -21,8 +27,6 @@ bool usable_window(const CameraDescription& d) {
 Camera::Camera(const CameraDescription& d, std::uint32_t width, std::uint32_t height)
     : type_(d.type),
       origin_(d.to_world[3]),
-      right_(normalize_or(Vec3(d.to_world[0]), Vec3(1, 0, 0))),
-      up_(normalize_or(Vec3(d.to_world[1]), Vec3(0, 1, 0))),
       forward_(-normalize_or(Vec3(d.to_world[2]), Vec3(0, 0, 1))),
       window_lower_(-1.0f),
       lens_radius_(std::max(finite_or(d.lens_radius, 0.0f), 0.0f)),
@@ -31,6 +35,14 @@ Camera::Camera(const CameraDescription& d, std::uint32_t width, std::uint32_t he
       rotation_(finite_or(d.aperture_rotation, 0.0f)) {
     if (!is_finite(origin_)) {
         origin_ = Vec3(0.0f);
+    }
+    right_ = across(forward_, Vec3(d.to_world[0]));
+    up_ = across(forward_, Vec3(d.to_world[1]));
+    up_ = across(right_, up_);
+    if (is_zero(right_) || is_zero(up_)) {
+        const Frame frame = Frame::from_z(-forward_);
+        right_ = frame.x;
+        up_ = frame.y;
     }
     Vec2 upper(1.0f);
     if (usable_window(d)) {
