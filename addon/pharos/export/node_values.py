@@ -119,7 +119,6 @@ def _image_use(f, node, projection: str) -> int:
         extension=_extension(f, node),
         projection=getattr(f.native.ImageProjection, _camel(projection)),
         projection_blend=getattr(node, "projection_blend", 0.0),
-        **_alpha_fields(f, node),
     )
 
 
@@ -130,14 +129,6 @@ def _extension(f, node):
         f.unsupported(node, f"extension {node.extension!r}")
         extension = f.native.ImageExtension.Repeat
     return extension
-
-
-def _alpha_fields(f, node) -> dict:
-    """Colours are divided by alpha where the node hands alpha out beside them."""
-    if not hasattr(f.native.ImageUse, "straight_alpha"):
-        return {}
-    alpha = next((s for s in node.outputs if s.identifier == "Alpha"), None)
-    return {"straight_alpha": alpha is not None and alpha.is_linked}
 
 
 def _memoised_image(f, node, scope, make):
