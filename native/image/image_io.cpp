@@ -12,6 +12,7 @@
 
 #include "core/color.h"
 #include "image/image_format.h"
+#include "image/texel_read.h"
 
 namespace pharos {
 
@@ -99,6 +100,7 @@ struct Depth {
     pixels.channels = channels_to_read(spec);
     const std::size_t texel = pixels.channels * texel_bytes(pixels.type);
     const std::size_t row = texel * pixels.width;
+    pixels.data.reserve(row * pixels.height + detail::kTexelPadding);  // Texture will not copy them
     pixels.data.resize(row * pixels.height);
     std::uint8_t* top = pixels.data.data() + row * (pixels.height - 1);
     const bool read = input.read_image(0,

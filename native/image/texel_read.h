@@ -87,15 +87,16 @@ class SrgbTable {
 
     // Linear values of the first three lanes; the fourth is kept.
     [[nodiscard]] __m128 to_linear(__m128 encoded) const {
-        alignas(16) float value[4];
-        _mm_store_ps(value, encoded);
-        for (int i = 0; i < 3; ++i) {
-            const float x = std::clamp(value[i] * kSegments, 0.0f, kSegments);
-            const int segment = std::min(static_cast<int>(x), static_cast<int>(kSegments) - 1);
-            const float t = x - static_cast<float>(segment);
-            value[i] = points_[segment] + t * (points_[segment + 1] - points_[segment]);
-        }
-        return _mm_load_ps(value);
+        const __m128 position =
+            _mm_min_ps(_mm_max_ps(_mm_mul_ps(encoded, _mm_set1_ps(kSegments)), _mm_setzero_ps()),
+                       _mm_set1_ps(kSegments));
+        const __m128i segment = _mm_min_epi32(_mm_cvttps_epi32(position),
+                                              _mm_set1_epi32(static_cast<int>(kSegments) - 1));
+        const __m128 t = _mm_sub_ps(position, _mm_cvtepi32_ps(segment));
+        const __m128 lower = _mm_i32gather_ps(points_, segment, 4);
+        const __m128 upper = _mm_i32gather_ps(points_ + 1, segment, 4);
+        const __m128 linear = _mm_fmadd_ps(t, _mm_sub_ps(upper, lower), lower);
+        return _mm_blend_ps(linear, encoded, 8);
     }
 
   private:

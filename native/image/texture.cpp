@@ -190,7 +190,7 @@ Texture::Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha a
 }
 
 Vec4 Texture::compute_mean() const {
-    constexpr std::size_t kMostTexels = 1u << 20;  // every n-th of a larger image
+    constexpr std::size_t kMostTexels = 1u << 18;  // every n-th of a larger image
     const std::size_t count = std::size_t{pixels_.width} * pixels_.height;
     const std::size_t step = std::max<std::size_t>(1, count / kMostTexels);
     const detail::SrgbTable& table = detail::srgb_table();

@@ -1,6 +1,7 @@
 // Closure operations: read their operands at one hit and set closures up.
 #include <algorithm>
 
+#include "materials/closure_builder.h"
 #include "materials/closure_setup.h"
 #include "materials/program_vm.h"
 
@@ -36,12 +37,12 @@ class OperandReader {
     std::uint32_t next_ = 0;
 };
 
-[[nodiscard]] ScatterInputs read_scatter(const Evaluation& e,
-                                         const NodeOp& op,
-                                         std::size_t lane,
-                                         const Vec3& ns) {
+void read_inputs(const Evaluation& e,
+                 const NodeOp& op,
+                 std::size_t lane,
+                 const Vec3& ns,
+                 ScatterInputs& inputs) {
     OperandReader in(e, op, lane);
-    ScatterInputs inputs;
     inputs.weight = in.vector();
     inputs.color = in.vector();
     inputs.distribution = static_cast<Distribution>(op.mode);
@@ -59,15 +60,14 @@ class OperandReader {
             break;
     }
     inputs.normal = op.code == NodeOpCode::Transparent ? ns : in.normal_or(ns);
-    return inputs;
 }
 
-[[nodiscard]] PrincipledV1Inputs read_v1(const Evaluation& e,
-                                         const NodeOp& op,
-                                         std::size_t lane,
-                                         const ClosureSetupContext& ctx) {
+void read_inputs(const Evaluation& e,
+                 const NodeOp& op,
+                 std::size_t lane,
+                 const Vec3& ns,
+                 PrincipledV1Inputs& v) {
     OperandReader in(e, op, lane);
-    PrincipledV1Inputs v;
     v.weight = in.vector();
     v.base_color = in.vector();
     v.subsurface = in.scalar();
@@ -85,19 +85,18 @@ class OperandReader {
     v.ior = in.scalar();
     v.transmission = in.scalar();
     v.transmission_roughness = in.scalar();
-    v.normal = in.normal_or(ctx.ns);
-    v.clearcoat_normal = in.normal_or(ctx.ns);
+    v.normal = in.normal_or(ns);
+    v.clearcoat_normal = in.normal_or(ns);
     v.tangent = in.vector_or(Vec3(0.0f));
     v.distribution = static_cast<Distribution>(op.mode);
-    return v;
 }
 
-[[nodiscard]] PrincipledV2Inputs read_v2(const Evaluation& e,
-                                         const NodeOp& op,
-                                         std::size_t lane,
-                                         const ClosureSetupContext& ctx) {
+void read_inputs(const Evaluation& e,
+                 const NodeOp& op,
+                 std::size_t lane,
+                 const Vec3& ns,
+                 PrincipledV2Inputs& v) {
     OperandReader in(e, op, lane);
-    PrincipledV2Inputs v;
     v.weight = in.vector();
     v.base_color = in.vector();
     v.metallic = in.scalar();
@@ -122,11 +121,10 @@ class OperandReader {
     v.thin_film_thickness = in.scalar();
     v.thin_film_ior = in.scalar();
     v.alpha = in.scalar();
-    v.normal = in.normal_or(ctx.ns);
-    v.coat_normal = in.normal_or(ctx.ns);
+    v.normal = in.normal_or(ns);
+    v.coat_normal = in.normal_or(ns);
     v.tangent = in.vector_or(Vec3(0.0f));
     v.distribution = static_cast<Distribution>(op.mode);
-    return v;
 }
 
 [[nodiscard]] Rgb finite_or_black(const Rgb& c) {
@@ -156,75 +154,244 @@ void find_tangent(const Evaluation& e,
     }
 }
 
-// Appends one operation's closures; returns what it emits.
+// The inputs of one closure operation. Constant ones are read once; only the normals of unconnected
+// sockets change from hit to hit then.
+template <class Inputs>
+class InputSource {
+  public:
+    InputSource(const Evaluation& e, const NodeOp& op) : e_(e), op_(op), constant_(true) {
+        for (std::uint32_t k = 0; k < op.operand_count; ++k) {
+            constant_ = constant_ && e.material.program.operands[op.first_operand + k] < 0;
+        }
+        if (constant_ && e.lanes > 0) {
+            read_inputs(e, op, 0, Vec3(0.0f), inputs_);
+        }
+    }
+
+    [[nodiscard]] bool constant() const { return constant_; }
+
+    [[nodiscard]] Inputs& at(std::size_t lane, const Vec3& ns) {
+        if (!constant_) {
+            read_inputs(e_, op_, lane, ns, inputs_);
+        } else {
+            set_open_normals(ns);
+        }
+        return inputs_;
+    }
+
+  private:
+    void set_open_normals(const Vec3& ns);
+
+    // The last operands: a normal, or a normal, the coat's and the tangent.
+    [[nodiscard]] bool is_open(std::uint32_t from_end) const {
+        const std::size_t number = op_.first_operand + op_.operand_count - from_end;
+        return e_.material.program.operands[number] == kDefaultOperand;
+    }
+
+    const Evaluation& e_;
+    const NodeOp& op_;
+    bool constant_;
+    Inputs inputs_;
+};
+
+template <>
+void InputSource<ScatterInputs>::set_open_normals(const Vec3& ns) {
+    inputs_.normal = op_.code == NodeOpCode::Transparent || is_open(1) ? ns : inputs_.normal;
+}
+
+template <>
+void InputSource<PrincipledV1Inputs>::set_open_normals(const Vec3& ns) {
+    inputs_.normal = is_open(3) ? ns : inputs_.normal;
+    inputs_.clearcoat_normal = is_open(2) ? ns : inputs_.clearcoat_normal;
+}
+
+template <>
+void InputSource<PrincipledV2Inputs>::set_open_normals(const Vec3& ns) {
+    inputs_.normal = is_open(3) ? ns : inputs_.normal;
+    inputs_.coat_normal = is_open(2) ? ns : inputs_.coat_normal;
+}
+
+using SetupFunction = void (*)(const ScatterInputs&, const ClosureSetupContext&, ClosureSink&);
+
+[[nodiscard]] SetupFunction setup_of(NodeOpCode code) {
+    switch (code) {
+        case NodeOpCode::Diffuse:
+            return setup_diffuse;
+        case NodeOpCode::Glossy:
+            return setup_glossy;
+        case NodeOpCode::Glass:
+            return setup_glass;
+        case NodeOpCode::Refraction:
+            return setup_refraction;
+        case NodeOpCode::Translucent:
+            return setup_translucent;
+        default:
+            return setup_transparent;
+    }
+}
+
+// Where closures of a run of hits go: hit by hit, one operation after the other.
+class ClosureWriter {
+  public:
+    ClosureWriter(const Evaluation& e, ClosureBatch& out)
+        : e_(e), out_(out), start_(out.closures.size()), used_(start_) {
+        // Room for the most that every hit can have, cut back to what they had.
+        out_.closures.resize(used_ + e.material.max_closures * e.lanes);
+    }
+
+    ~ClosureWriter() { out_.closures.resize(used_); }
+
+    ClosureWriter(const ClosureWriter&) = delete;
+    ClosureWriter& operator=(const ClosureWriter&) = delete;
+
+    // add(hit, context, sink) appends a hit's closures and returns its emission.
+    template <class Function>
+    void write_hit(std::size_t lane, const Function& add) {
+        const SurfaceInteraction& hit = e_.hit(lane);
+        const std::size_t slot = e_.hit_index(lane);
+        ClosureSetupContext ctx = context_of(e_, hit);
+        ClosureSink sink(
+            std::span<Closure>(out_.closures).subspan(used_, e_.material.max_closures));
+        out_.emission[slot] = add(hit, ctx, sink);
+        out_.first[slot] = static_cast<std::uint32_t>(used_);
+        out_.count[slot] = static_cast<std::uint32_t>(sink.count());
+        out_.dropped_closures += sink.dropped();
+        used_ += sink.count();
+    }
+
+    // The closure written last, again, with another normal.
+    void repeat_last(std::size_t lane, const Vec3& normal) {
+        const std::size_t slot = e_.hit_index(lane);
+        out_.closures[used_] = out_.closures[used_ - 1];
+        out_.closures[used_].n = normal;
+        out_.first[slot] = static_cast<std::uint32_t>(used_++);
+        out_.count[slot] = 1;
+        out_.emission[slot] = Rgb(0.0f);
+    }
+
+    [[nodiscard]] bool last_is_lambert() const {
+        return used_ > start_ && out_.closures[used_ - 1].type == ClosureType::Diffuse;
+    }
+
+  private:
+    const Evaluation& e_;
+    ClosureBatch& out_;
+    std::size_t start_;
+    std::size_t used_;
+};
+
+// Closures of one operation at one hit; returns what it emits.
+[[nodiscard]] Rgb add_scatter(InputSource<ScatterInputs>& source,
+                              SetupFunction setup,
+                              std::size_t lane,
+                              const ClosureSetupContext& ctx,
+                              ClosureSink& sink) {
+    setup(source.at(lane, ctx.ns), ctx, sink);
+    return Rgb(0.0f);
+}
+
+[[nodiscard]] Rgb add_principled(const Evaluation& e,
+                                 InputSource<PrincipledV1Inputs>& source,
+                                 std::size_t lane,
+                                 ClosureSetupContext& ctx,
+                                 ClosureSink& sink) {
+    const PrincipledV1Inputs& inputs = source.at(lane, ctx.ns);
+    find_tangent(e, e.hit(lane), inputs, ctx);
+    setup_principled_v1(inputs, ctx, sink);
+    return Rgb(0.0f);
+}
+
+[[nodiscard]] Rgb add_principled(const Evaluation& e,
+                                 InputSource<PrincipledV2Inputs>& source,
+                                 std::size_t lane,
+                                 ClosureSetupContext& ctx,
+                                 ClosureSink& sink) {
+    const PrincipledV2Inputs& inputs = source.at(lane, ctx.ns);
+    find_tangent(e, e.hit(lane), inputs, ctx);
+    const Rgb weight = setup_principled_v2(inputs, ctx, sink);
+    return finite_or_black(weight * inputs.emission_color * inputs.emission_strength);
+}
+
 [[nodiscard]] Rgb add_closures(const Evaluation& e,
                                const NodeOp& op,
                                std::size_t lane,
                                ClosureSetupContext& ctx,
                                ClosureSink& sink) {
     switch (op.code) {
-        case NodeOpCode::Diffuse:
-            setup_diffuse(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
-        case NodeOpCode::Glossy:
-            setup_glossy(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
-        case NodeOpCode::Glass:
-            setup_glass(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
-        case NodeOpCode::Refraction:
-            setup_refraction(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
-        case NodeOpCode::Transparent:
-            setup_transparent(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
-        case NodeOpCode::Translucent:
-            setup_translucent(read_scatter(e, op, lane, ctx.ns), ctx, sink);
-            break;
         case NodeOpCode::Emission:
         case NodeOpCode::Background:
             return read_emission(e, op, lane);
         case NodeOpCode::PrincipledV1: {
-            const PrincipledV1Inputs inputs = read_v1(e, op, lane, ctx);
-            find_tangent(e, e.hit(lane), inputs, ctx);
-            setup_principled_v1(inputs, ctx, sink);
-            break;
+            InputSource<PrincipledV1Inputs> source(e, op);
+            return add_principled(e, source, lane, ctx, sink);
         }
         case NodeOpCode::PrincipledV2: {
-            const PrincipledV2Inputs inputs = read_v2(e, op, lane, ctx);
-            find_tangent(e, e.hit(lane), inputs, ctx);
-            const Rgb weight = setup_principled_v2(inputs, ctx, sink);
-            return finite_or_black(weight * inputs.emission_color * inputs.emission_strength);
+            InputSource<PrincipledV2Inputs> source(e, op);
+            return add_principled(e, source, lane, ctx, sink);
         }
-        default:
-            break;
+        default: {
+            InputSource<ScatterInputs> source(e, op);
+            return add_scatter(source, setup_of(op.code), lane, ctx, sink);
+        }
     }
-    return Rgb(0.0f);
+}
+
+// Materials of one closure operation, which most are: what is constant is read once.
+template <class Inputs>
+void run_principled(const Evaluation& e, const NodeOp& op, ClosureWriter& writer) {
+    InputSource<Inputs> source(e, op);
+    for (std::size_t lane = 0; lane < e.lanes; ++lane) {
+        writer.write_hit(lane, [&](const auto&, ClosureSetupContext& ctx, ClosureSink& sink) {
+            return add_principled(e, source, lane, ctx, sink);
+        });
+    }
+}
+
+void run_scatter(const Evaluation& e, const NodeOp& op, ClosureWriter& writer) {
+    InputSource<ScatterInputs> source(e, op);
+    const SetupFunction setup = setup_of(op.code);
+    for (std::size_t lane = 0; lane < e.lanes; ++lane) {
+        // A constant Lambert closure differs from hit to hit in its normal alone.
+        if (lane > 0 && op.code == NodeOpCode::Diffuse && source.constant() &&
+            writer.last_is_lambert()) {
+            const SurfaceInteraction& hit = e.hit(lane);
+            writer.repeat_last(
+                lane, setup::diffuse_normal(source.at(lane, hit.ns).normal, context_of(e, hit)));
+            continue;
+        }
+        writer.write_hit(lane, [&](const auto&, ClosureSetupContext& ctx, ClosureSink& sink) {
+            return add_scatter(source, setup, lane, ctx, sink);
+        });
+    }
 }
 
 }  // namespace
 
 void run_closures(const Evaluation& e, std::span<const NodeOp> ops, ClosureBatch& out) {
-    // Room for the most that every hit can have, cut back to what they had.
-    const std::size_t most = e.material.max_closures;
-    std::size_t used = out.closures.size();
-    out.closures.resize(used + most * e.lanes);
-    for (std::size_t lane = 0; lane < e.lanes; ++lane) {
-        const SurfaceInteraction& hit = e.hit(lane);
-        const std::size_t slot = e.hit_index(lane);
-        ClosureSetupContext ctx = context_of(e, hit);
-        ClosureSink sink(std::span<Closure>(out.closures).subspan(used, most));
-        Rgb emission(0.0f);
-        for (const NodeOp& op : ops) {
-            emission += add_closures(e, op, lane, ctx, sink);
+    ClosureWriter writer(e, out);
+    if (ops.size() == 1) {
+        const NodeOp& op = ops.front();
+        switch (op.code) {
+            case NodeOpCode::Emission:
+            case NodeOpCode::Background:
+                break;
+            case NodeOpCode::PrincipledV1:
+                return run_principled<PrincipledV1Inputs>(e, op, writer);
+            case NodeOpCode::PrincipledV2:
+                return run_principled<PrincipledV2Inputs>(e, op, writer);
+            default:
+                return run_scatter(e, op, writer);
         }
-        out.first[slot] = static_cast<std::uint32_t>(used);
-        out.count[slot] = static_cast<std::uint32_t>(sink.count());
-        out.emission[slot] = emission;
-        out.dropped_closures += sink.dropped();
-        used += sink.count();
     }
-    out.closures.resize(used);
+    for (std::size_t lane = 0; lane < e.lanes; ++lane) {
+        writer.write_hit(lane, [&](const auto&, ClosureSetupContext& ctx, ClosureSink& sink) {
+            Rgb emission(0.0f);
+            for (const NodeOp& op : ops) {
+                emission += add_closures(e, op, lane, ctx, sink);
+            }
+            return emission;
+        });
+    }
 }
 
 void run_emission(const Evaluation& e, std::span<const NodeOp> ops, std::span<Rgb> values) {
@@ -237,7 +404,8 @@ void run_emission(const Evaluation& e, std::span<const NodeOp> ops, std::span<Rg
             }
             const SurfaceInteraction& hit = e.hit(lane);
             ClosureSetupContext ctx = context_of(e, hit);
-            const PrincipledV2Inputs inputs = read_v2(e, op, lane, ctx);
+            PrincipledV2Inputs inputs;
+            read_inputs(e, op, lane, ctx.ns, inputs);
             const Rgb weight = principled_v2_emission_weight(inputs, ctx);
             sum += finite_or_black(weight * inputs.emission_color * inputs.emission_strength);
         }
