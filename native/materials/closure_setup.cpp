@@ -62,7 +62,9 @@ Vec3 ensure_valid_reflection(const Vec3& ng, const Vec3& wo, const Vec3& n) {
     const float ix = glm::dot(wo, across);
     const float length = ix * ix + io * io;
     const float rx = safe_sqrt(length - threshold * threshold);
-    return normalize_or(across * (ix + rx) + ng * (io + threshold), ng);
+    // ix + rx without cancellation where wo leans away from n.
+    const float x = ix < 0.0f ? (io * io - threshold * threshold) / (rx - ix) : ix + rx;
+    return normalize_or(across * x + ng * (io + threshold), ng);
 }
 
 namespace setup {
@@ -76,6 +78,17 @@ Vec3 diffuse_normal(const Vec3& n, const ClosureSetupContext& ctx) {
     return ctx.blender_version < 306 ? glossy_normal(n, ctx) : normalize_or(n, ctx.ns);
 }
 
+Vec3 tangent_around(const Vec3& n, const Vec3& direction) {
+    const Vec3 d = normalize_or(direction, Vec3(0.0f));
+    const Vec3 once = d - n * glm::dot(d, n);
+    if (!(length_squared(once) > 1e-6f)) {
+        return Vec3(0.0f);
+    }
+    // A second time: what was left of n has grown by the normalisation.
+    const Vec3 t = glm::normalize(once);
+    return glm::normalize(t - n * glm::dot(t, n));
+}
+
 void set_roughness(Closure& c, float roughness) {
     c.alpha_x = c.alpha_y = sqr(unit(roughness));
 }
@@ -83,8 +96,7 @@ void set_roughness(Closure& c, float roughness) {
 void set_anisotropic_roughness(Closure& c, float roughness, const Anisotropy& anisotropy) {
     set_roughness(c, roughness);
     const float amount = unit(anisotropy.amount);
-    const Vec3 tangent =
-        normalize_or(anisotropy.tangent - c.n * glm::dot(anisotropy.tangent, c.n), Vec3(0.0f));
+    const Vec3 tangent = tangent_around(c.n, anisotropy.tangent);
     if (amount == 0.0f || is_zero(tangent)) {
         return;
     }

@@ -47,7 +47,10 @@ void add_sheen(const PrincipledV2Inputs& in,
     c.alpha_x = ltc.a;
     c.alpha_y = ltc.b;
     c.energy_scale = ltc.albedo;
-    c.tangent = normalize_or(ctx.wo - c.n * glm::dot(ctx.wo, c.n), Frame::from_z(c.n).x);
+    c.tangent = tangent_around(c.n, ctx.wo);
+    if (is_zero(c.tangent)) {
+        c.tangent = Frame::from_z(c.n).x;
+    }
     layers.weight = below_layer(layers.weight, add_closure(c, ctx, sink));
 }
 

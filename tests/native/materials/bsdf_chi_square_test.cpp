@@ -8,7 +8,7 @@
 namespace pharos::test {
 namespace {
 
-constexpr int kConfigurations = 10;
+constexpr int kConfigurations = 6;
 
 std::optional<Vec3> smooth_direction(const Bsdf& bsdf, Random& random) {
     const float u = random.uniform();

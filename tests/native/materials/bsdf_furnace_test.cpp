@@ -183,6 +183,39 @@ TEST(Furnace, PrincipledV2Glass) {
     expect_table(principled_v2(0.0f, 1.0f), 405, kOnes, 0.010f);
 }
 
+// The fitted sheen against Blender 4.5: furnace, and a sun at 60 degrees on the camera's side,
+// beyond and at 75 degrees across.
+TEST(Furnace, PrincipledV2Sheen) {
+    struct Case {
+        float roughness, cosine, albedo, towards, beyond, across;
+    };
+
+    for (const Case& c : {Case{0.3f, 0.1f, 0.434774f, 0.0324587f, 0.0278204f, 0.122879f},
+                          Case{0.5f, 0.5f, 0.153873f, 0.0344758f, 0.0285324f, 0.0372864f},
+                          Case{1.0f, 0.7f, 0.423166f, 0.0760727f, 0.0760792f, 0.0439328f}}) {
+        PrincipledV2Inputs in;
+        in.normal = in.coat_normal = Vec3(0, 0, 1);
+        in.base_color = Rgb(0.0f);
+        in.specular_ior_level = 0.0f;
+        in.sheen_weight = 1.0f;
+        in.sheen_roughness = c.roughness;
+        const SurfaceSetup setup = [in](const ClosureSetupContext& ctx, ClosureSink& sink) {
+            EXPECT_LT(setup_principled_v2(in, ctx, sink).x, 1.0f);
+        };
+        const float degrees = std::acos(c.cosine) * 180.0f / kPi;
+        EXPECT_NEAR(furnace(setup, degrees, 405), c.albedo, 0.004f);
+        Surface surface;
+        const Vec3 wo = direction_at(c.cosine, 0.0f);
+        const Bsdf& bsdf = build(surface, make_context(wo, 405), setup);
+        const auto radiance = [&bsdf](float angle, float phi) {
+            return eval_bsdf(bsdf, direction_at(std::cos(angle * kPi / 180.0f), phi)).f_cos.x;
+        };
+        EXPECT_NEAR(radiance(60.0f, 0.0f), c.towards, 0.05f * c.towards);
+        EXPECT_NEAR(radiance(60.0f, kPi), c.beyond, 0.05f * c.beyond);
+        EXPECT_NEAR(radiance(75.0f, 0.5f * kPi), c.across, 0.05f * c.across);
+    }
+}
+
 TEST(Furnace, EnergyPreservingOrenNayar) {
     const auto make = [](float roughness) -> SurfaceSetup {
         ScatterInputs in;
