@@ -1,4 +1,4 @@
-"""Builds the scenes named after `--` (all without names) into this folder; run inside Blender 3.4.1.
+"""Builds the scenes named after `--` (without names: all) into this folder; for Blender 3.4.1.
 
     blender -b --factory-startup --python-exit-code 3 -P scenes/build_scenes.py -- cornell door
 """

@@ -66,7 +66,7 @@ def _set_cycles(cycles):
 
 
 def shader(name, kind, **inputs):
-    """A material of one shader node, for example shader("red", "BsdfDiffuse", Color=(.6, .1, .1))."""
+    """A material of one shader node, as in shader("red", "BsdfDiffuse", Color=(.6, .1, .1))."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes = material.node_tree.nodes

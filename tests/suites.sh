@@ -1,0 +1,164 @@
+# The suites of tests/run; sourced. Each adds to suite_passed, suite_failed and suite_skipped, and
+# keeps what its program said in build/tests/NAME.log.
+
+LOGS=$PHAROS_ROOT/build/tests
+PYTHON=$PHAROS_ROOT/build/bpy/bin/python
+
+describe_suites() {
+    cat <<'END'
+python   ruff; pytest of tests/python: layering, hygiene, benchmark metric, README commands
+format   clang-format of native/ and tests/native/
+native   the C++ unit tests (ctest without the label slow)
+blender  tests/blender in Blender 3.4.1
+bpy      tests/blender in bpy 4.5
+render   scenes/render: two pictures, a second run without building, Ctrl-C and SIGTERM
+tidy     clang-tidy; files seen before are not looked at again, within a budget of time
+asan     unit tests under the address and undefined-behaviour sanitizers
+tsan     tests of threads, integrator and session under the thread sanitizer
+END
+}
+
+# count PASSED FAILED [SKIPPED]
+count() {
+    suite_passed=$((suite_passed + $1))
+    suite_failed=$((suite_failed + $2))
+    suite_skipped=$((suite_skipped + ${3:-0}))
+}
+
+# logged NAME SECONDS COMMAND...: runs it within the time, all it says goes to build/tests/NAME.log.
+logged() {
+    local name=$1 seconds=$2
+    shift 2
+    mkdir -p "$LOGS"
+    timeout -k 10 "$seconds" "$@" >"$LOGS/$name.log" 2>&1 </dev/null
+}
+
+# check NAME SECONDS COMMAND...: one test, passed when the command succeeds.
+check() {
+    if logged "$@"; then
+        count 1 0
+    else
+        count 0 1
+        printf -- '--- %s failed:\n' "$1"
+        tail -n 25 "$LOGS/$1.log"
+    fi
+}
+
+# The number before a word in a line like '12 passed, 1 failed, 2 skipped'; 0 without it.
+number_before() {
+    sed -n "s/.*\b\([0-9][0-9]*\) $1.*/\1/p" <<<"$2" | tail -n 1 | grep . || echo 0
+}
+
+# counted NAME SECONDS COMMAND...: a program whose last line of the above form counts.
+counted() {
+    local name=$1 status line bad
+    logged "$@"
+    status=$?
+    line=$(grep -aE '\b[0-9]+ (passed|failed)\b' "$LOGS/$name.log" | tail -n 1)
+    bad=$(number_before 'failed' "$line")
+    bad=$((bad + $(number_before 'errors\?' "$line")))
+    # A program that ended badly without saying what failed has failed once.
+    [ "$status" = 0 ] || [ "$bad" -gt 0 ] || bad=1
+    [ -n "$line" ] || bad=$((bad > 0 ? bad : 1))
+    count "$(number_before passed "$line")" "$bad" "$(number_before skipped "$line")"
+    if [ "$bad" -gt 0 ]; then
+        printf -- '--- %s (status %s):\n' "$name" "$status"
+        grep -aE 'FAIL|Error|error:|assert' "$LOGS/$name.log" | head -n 25
+        tail -n 10 "$LOGS/$name.log"
+    fi
+}
+
+# run_ctest NAME SECONDS PRESET [ctest options]: the unit tests of a preset, two at a time.
+run_ctest() {
+    local name=$1 seconds=$2 preset=$3 report=$LOGS/$1.xml status
+    shift 3
+    mkdir -p "$LOGS"
+    rm -f "$report"
+    (cd "$PHAROS_ROOT" && logged "$name" "$seconds" ctest --preset "$preset" -j 2 --output-junit "$report" "$@")
+    status=$?
+    if [ -f "$report" ]; then
+        count $("$PYTHON" "$PHAROS_ROOT/tests/read_junit.py" "$report")
+    else
+        count 0 1
+        printf -- '--- %s ended without a report (status %s):\n' "$name" "$status"
+        tail -n 25 "$LOGS/$name.log"
+    fi
+    [ "$status" = 0 ] || grep -aE 'Failure|ERROR:|WARNING: ThreadSanitizer|runtime error|\(Failed\)|\(Timeout\)' \
+        "$LOGS/$name.log" | head -n 30
+}
+
+# build_or_fail PRESET TARGETS...: counts a failure where the build breaks.
+build_or_fail() {
+    build_preset "$@" && return
+    count 0 1
+    return 1
+}
+
+suite_python() {
+    check ruff 120 "$PHAROS_ROOT/build/bpy/bin/ruff" check --no-cache "$PHAROS_ROOT"
+    counted pytest 600 "$PYTHON" -m pytest "$PHAROS_ROOT/tests/python" -c "$PHAROS_ROOT/pyproject.toml"
+}
+
+suite_format() {
+    local sources
+    mapfile -d '' -t sources < <(find "$PHAROS_ROOT/native" "$PHAROS_ROOT/tests" \
+        \( -name '*.h' -o -name '*.cpp' \) -print0 | sort -z)
+    check clang-format 120 clang-format --dry-run -Werror --style=file "${sources[@]}"
+}
+
+suite_native() {
+    build_or_fail release all || return
+    run_ctest native 900 release
+}
+
+blender_tests() {
+    local name=$1
+    shift
+    if [ ! -f "$PHAROS_ROOT/tests/blender/run_all.py" ]; then
+        count 0 1
+        echo "tests/blender/run_all.py is missing"
+        return
+    fi
+    counted "$name" 900 "$@"
+}
+
+suite_blender() {
+    blender_tests blender "$BLENDER" -b --factory-startup --addons pharos --python-exit-code 3 \
+        -P "$PHAROS_ROOT/tests/blender/run_all.py"
+}
+
+suite_bpy() {
+    blender_tests bpy "$PYTHON" "$PHAROS_ROOT/tests/blender/run_all.py"
+}
+
+suite_render() {
+    counted render 900 "$PHAROS_ROOT/tests/render_command.sh"
+}
+
+suite_tidy() {
+    build_or_fail release all || return
+    counted tidy 1500 "$PYTHON" "$PHAROS_ROOT/tests/tidy.py" --budget "${PHAROS_TIDY_SECONDS:-600}" \
+        --cache "$PHAROS_CACHE/tidy"
+}
+
+# Sanitized programs are several times slower: tests that count many random numbers take part only
+# in the plain build (their names say so), and the rest has a limit of its own.
+STATISTICAL='ChiSquare|chi_square|Statistic|Random.*Bound|Long'
+
+suite_asan() {
+    build_or_fail asan all || return
+    ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1 \
+        LSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/leaks.txt:print_suppressions=0 \
+        UBSAN_OPTIONS=print_stacktrace=1 \
+        run_ctest asan 900 asan -E "$STATISTICAL"
+}
+
+suite_tsan() {
+    local targets=() module
+    for module in core film integrator session; do
+        ! compgen -G "$PHAROS_ROOT/tests/native/$module/*_test.cpp" >/dev/null || targets+=("${module}_test")
+    done
+    build_or_fail tsan "${targets[@]}" || return
+    TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \
+        run_ctest tsan 900 tsan -R '^(core|film|integrator|session)\.' -E "$STATISTICAL"
+}
