@@ -121,6 +121,17 @@ struct ClosureChoice {
     return choice;
 }
 
+// The sample weight is the average albedo, found at set-up; here it gets its colour back.
+[[nodiscard]] inline Rgb albedo_from_sample_weight(const Closure& c, const Vec3& wo) {
+    Rgb tint = c.weight;
+    if (c.type == ClosureType::GgxReflection && c.fresnel != FresnelType::None &&
+        c.fresnel != FresnelType::Dielectric) {
+        tint *= lerp(c.f0, Rgb(1.0f), schlick_weight(glm::dot(c.n, wo)));
+    }
+    const float mean = average(tint);
+    return mean > 0.0f ? tint * (c.sample_weight / mean) : Rgb(0.0f);
+}
+
 // A delta closure chosen with probability `share`.
 [[nodiscard]] std::optional<BsdfSample> sample_delta(const Closure& c,
                                                      const Bsdf& bsdf,
@@ -268,16 +279,18 @@ BsdfTraits bsdf_traits(const Bsdf& bsdf) {
     float smooth = 0.0f;
     float transmitted = 0.0f;
     for (const Closure& c : bsdf.closures) {
-        const ClosureAlbedo albedo = closure_albedo(c, bsdf.wo);
-        traits.albedo += albedo.reflected + albedo.transmitted;
+        traits.albedo += albedo_from_sample_weight(c, bsdf.wo);
         if (is_delta(c)) {
             delta += c.sample_weight;
             continue;
         }
         smooth += c.sample_weight;
-        const float through = average(albedo.transmitted);
-        const float sum = average(albedo.reflected) + through;
-        transmitted += sum > 0.0f ? c.sample_weight * (through / sum) : 0.0f;
+        if (c.type == ClosureType::GgxGlass) {
+            transmitted +=
+                c.sample_weight * (1.0f - fresnel_dielectric(glm::dot(c.n, bsdf.wo), c.eta));
+        } else if (c.type == ClosureType::Translucent || c.type == ClosureType::GgxRefraction) {
+            transmitted += c.sample_weight;
+        }
         if (c.type == ClosureType::GgxReflection || c.type == ClosureType::GgxGlass) {
             traits.min_alpha = std::min(traits.min_alpha, std::min(c.alpha_x, c.alpha_y));
         } else if (c.type == ClosureType::Clearcoat) {

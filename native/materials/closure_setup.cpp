@@ -134,6 +134,11 @@ Rgb add_closure(Closure& c, const ClosureSetupContext& ctx, ClosureSink& sink) {
     if (!(weight >= kWeightCutoff)) {
         return Rgb(0.0f);
     }
+    if (c.type <= ClosureType::Transparent) {
+        c.sample_weight = weight;
+        sink.add(c);
+        return c.weight;
+    }
     const ClosureAlbedo albedo = closure_albedo(c, ctx.wo);
     const Rgb sum = albedo.reflected + albedo.transmitted;
     // The floor keeps every lobe reachable, however low the estimate.

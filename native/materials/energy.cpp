@@ -15,18 +15,54 @@ namespace {
 // Axes: roughness, and the square root of mu (albedos bend most at grazing view).
 constexpr std::size_t kFine = 32;
 constexpr std::size_t kCoarse = 16;
-constexpr int kFineSamples = 610;
-constexpr int kCoarseSamples = 377;
+constexpr int kFineSamples = 377;
+constexpr int kCoarseSamples = 233;
 constexpr float kMinMu = 1e-4f;
 constexpr float kMinAlpha = 1e-4f;
 
-// Point i of the Fibonacci lattice of `count` points; the angle is the wrapping dimension.
-[[nodiscard]] Vec2 lattice_point(int i, int count) {
-    const int previous = count == kFineSamples ? 377 : 233;
-    const int wrapped = (i * previous) % count;
-    return Vec2((static_cast<float>(wrapped) + 0.5f) / static_cast<float>(count),
-                (static_cast<float>(i) + 0.5f) / static_cast<float>(count));
-}
+// Points of the spherical cap that visible normals are mapped from, before the cap is cut to the
+// view (Dupuy, Benyoub 2023): a Fibonacci lattice, the angle being its wrapping dimension.
+template <int N>
+struct CapLattice {
+    std::array<float, N> cosine{};
+    std::array<float, N> height{};
+
+    CapLattice() {
+        const int previous = N == kFineSamples ? 233 : 144;
+        for (int i = 0; i < N; ++i) {
+            const float turns =
+                (static_cast<float>((i * previous) % N) + 0.5f) / static_cast<float>(N);
+            const std::size_t k = static_cast<std::size_t>(i);
+            cosine[k] = sincos_turns(turns).cos;
+            height[k] = (static_cast<float>(i) + 0.5f) / static_cast<float>(N);
+        }
+    }
+};
+
+// Heights and cosines to the view of the visible normals of one view direction (sin, 0, cos).
+template <int N>
+struct VisibleNormals {
+    std::array<float, N> z{};
+    std::array<float, N> cosine{};
+
+    VisibleNormals(const CapLattice<N>& lattice, const Vec3& wo, float alpha) {
+        const Vec3 view = glm::normalize(Vec3(alpha * wo.x, 0.0f, wo.z));
+        for (std::size_t i = 0; i < static_cast<std::size_t>(N); ++i) {
+            // As sample_visible_normal, written out so that the loop vectorises; only x and z of
+            // the normal and the length of its y are needed.
+            const float cap_z = lattice.height[i] * (1.0f + view.z) - view.z;
+            const float radius_squared = std::max(1.0f - cap_z * cap_z, 0.0f);
+            const float x = std::sqrt(radius_squared) * lattice.cosine[i];
+            const float y_squared = std::max(radius_squared - x * x, 0.0f);
+            const float nx = alpha * (x + view.x);
+            const float nz = std::max(cap_z + view.z, 0.0f);
+            const float scale =
+                1.0f / std::sqrt(nx * nx + alpha * alpha * y_squared + nz * nz + 1e-30f);
+            z[i] = nz * scale;
+            cosine[i] = std::max((nx * wo.x + nz * wo.z) * scale, 0.0f);
+        }
+    }
+};
 
 [[nodiscard]] float node(std::size_t i, std::size_t count) {
     return static_cast<float>(i) / static_cast<float>(count - 1);
@@ -61,23 +97,28 @@ struct ReflectionTables {
     std::array<float, kFine> average{};
 
     ReflectionTables() {
+        const CapLattice<kFineSamples> lattice;
         for (std::size_t r = 0; r < kFine; ++r) {
             const float alpha = std::max(sqr(node(r, kFine)), kMinAlpha);
             for (std::size_t m = 0; m < kFine; ++m) {
-                albedo[r][m] = integrate(view_direction(m, kFine), alpha);
+                albedo[r][m] = integrate(lattice, view_direction(m, kFine), alpha);
             }
             average[r] = average_over_directions(r);
         }
     }
 
-    [[nodiscard]] static float integrate(const Vec3& wo, float alpha) {
+    [[nodiscard]] static float integrate(const CapLattice<kFineSamples>& lattice,
+                                         const Vec3& wo,
+                                         float alpha) {
+        const VisibleNormals<kFineSamples> h(lattice, wo, alpha);
         const float so = smith_s_isotropic(wo.z, alpha);
+        std::array<float, kFineSamples> weight;
+        for (std::size_t i = 0; i < weight.size(); ++i) {
+            weight[i] = masking_weight(wo.z, so, 2.0f * h.cosine[i] * h.z[i] - wo.z, alpha);
+        }
         float sum = 0.0f;
-        for (int i = 0; i < kFineSamples; ++i) {
-            const Vec3 h =
-                sample_visible_normal(wo, alpha, alpha, 1.0f, lattice_point(i, kFineSamples));
-            const float zi = 2.0f * glm::dot(wo, h) * h.z - wo.z;
-            sum += masking_weight(wo.z, so, zi, alpha);
+        for (const float w : weight) {
+            sum += w;
         }
         return sum / static_cast<float>(kFineSamples);
     }
@@ -111,6 +152,7 @@ struct DielectricTables {
     std::array<Coarse3, 2> shape{};
 
     DielectricTables() {
+        const CapLattice<kCoarseSamples> lattice;
         for (std::size_t inverse = 0; inverse < 2; ++inverse) {
             CoarseRow eta;
             for (std::size_t k = 0; k < kCoarse; ++k) {
@@ -118,42 +160,60 @@ struct DielectricTables {
             }
             for (std::size_t r = 0; r < kCoarse; ++r) {
                 for (std::size_t m = 0; m < kCoarse; ++m) {
-                    integrate(eta, r, m, glass[inverse][r][m], shape[inverse][r][m]);
+                    const float alpha = std::max(sqr(node(r, kCoarse)), kMinAlpha);
+                    const Vec3 wo = view_direction(m, kCoarse);
+                    const VisibleNormals<kCoarseSamples> h(lattice, wo, alpha);
+                    integrate(h, {eta, wo.z, alpha}, glass[inverse][r][m], shape[inverse][r][m]);
                 }
             }
         }
     }
 
+    struct Setting {
+        CoarseRow eta;
+        float mu;
+        float alpha;
+    };
+
     // One row over all indices: every visible normal serves all of them.
-    static void integrate(const CoarseRow& eta,
-                          std::size_t rough,
-                          std::size_t mu,
+    static void integrate(const VisibleNormals<kCoarseSamples>& h,
+                          const Setting& setting,
                           CoarseRow& glass_row,
                           CoarseRow& shape_row) {
-        const float alpha = std::max(sqr(node(rough, kCoarse)), kMinAlpha);
-        const Vec3 wo = view_direction(mu, kCoarse);
-        const float so = smith_s_isotropic(wo.z, alpha);
+        const float so = smith_s_isotropic(setting.mu, setting.alpha);
+        CoarseRow inverse;
+        CoarseRow f0;
+        for (std::size_t k = 0; k < kCoarse; ++k) {
+            inverse[k] = 1.0f / setting.eta[k];
+            f0[k] = f0_from_eta(setting.eta[k]);
+        }
+        CoarseRow glass{};
+        CoarseRow shape{};
         float reflected = 0.0f;
-        glass_row.fill(0.0f);
-        shape_row.fill(0.0f);
-        for (int i = 0; i < kCoarseSamples; ++i) {
-            const Vec3 h =
-                sample_visible_normal(wo, alpha, alpha, 1.0f, lattice_point(i, kCoarseSamples));
-            const float oh = std::max(glm::dot(wo, h), 0.0f);
-            const float weight = masking_weight(wo.z, so, 2.0f * oh * h.z - wo.z, alpha);
+        for (std::size_t i = 0; i < h.z.size(); ++i) {
+            const float oh = std::max(h.cosine[i], 1e-6f);
+            const float weight =
+                masking_weight(setting.mu, so, 2.0f * oh * h.z[i] - setting.mu, setting.alpha);
             reflected += weight;
             for (std::size_t k = 0; k < kCoarse; ++k) {
-                const float f = fresnel_dielectric(oh, eta[k]);
-                const float cosine = std::max(refracted_cosine(oh, eta[k]), 0.0f);
+                // Walter's g is eta times the refracted cosine; zero at total reflection gives F
+                // = 1.
+                const float eta = setting.eta[k];
+                const float g = std::sqrt(std::max((eta - 1.0f) * (eta + 1.0f) + oh * oh, 0.0f));
+                const float a = (g - oh) / (g + oh);
+                const float b = (oh * (g + oh) - 1.0f) / (oh * (g - oh) + 1.0f);
+                const float f = std::min(0.5f * a * a * (1.0f + b * b), 1.0f);
                 // Cosine of the refracted direction below the surface.
-                const float below = wo.z / eta[k] - (oh / eta[k] - cosine) * h.z;
-                glass_row[k] += f * weight + (1.0f - f) * masking_weight(wo.z, so, below, alpha);
-                shape_row[k] += dielectric_shape(f, eta[k]) * weight;
+                const float below = (setting.mu - (oh - g) * h.z[i]) * inverse[k];
+                glass[k] +=
+                    f * weight + (1.0f - f) * masking_weight(setting.mu, so, below, setting.alpha);
+                shape[k] += std::max(f - f0[k], 0.0f) * weight;
             }
         }
         for (std::size_t k = 0; k < kCoarse; ++k) {
-            glass_row[k] /= static_cast<float>(kCoarseSamples);
-            shape_row[k] = reflected > 0.0f ? shape_row[k] / reflected : 1.0f;
+            glass_row[k] = glass[k] / static_cast<float>(kCoarseSamples);
+            shape_row[k] =
+                reflected > 0.0f ? saturate(shape[k] / (reflected * (1.0f - f0[k]))) : 1.0f;
         }
     }
 };

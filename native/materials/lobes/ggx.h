@@ -82,7 +82,7 @@ struct GgxTerms {
     }
     const float bound = vndf_bound(local.z, std::min(c.alpha_x, c.alpha_y));
     const Vec3 h = frame.to_world(sample_visible_normal(local, c.alpha_x, c.alpha_y, bound, u));
-    return glm::normalize(h * (2.0f * glm::dot(wo, h)) - wo);
+    return h * (2.0f * glm::dot(wo, h)) - wo;
 }
 
 namespace detail {
@@ -150,7 +150,7 @@ namespace detail {
         return std::nullopt;
     }
     if (u_branch < detail::reflect_probability(closure_fresnel_split(c, oh))) {
-        const Vec3 mirrored = glm::normalize(h * (2.0f * oh) - wo);
+        const Vec3 mirrored = h * (2.0f * oh) - wo;
         return glm::dot(c.n, mirrored) > 0.0f ? std::optional(mirrored) : std::nullopt;
     }
     const float cosine = refracted_cosine(oh, c.eta);
