@@ -100,7 +100,7 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
     }
     const Bounds3& scene = input.scene_bounds;
     const float radius = scene.empty() ? 1.0f : 0.5f * glm::length(scene.extent());
-    impl_->selection = LightSelection(std::move(bounds), radius);
+    impl_->selection = LightSelection(bounds, radius);
     impl_->tree = LampTree(impl_->lamps);
 }
 

@@ -1,5 +1,7 @@
 #include "lights/light_selection.h"
 
+#include <vector>
+
 #include "core/color.h"
 
 namespace pharos {
@@ -10,58 +12,14 @@ namespace {
 constexpr float kMinReceiverCosine = 0.02f;
 constexpr float kMinConeFactor = 0.05f;
 
-// Largest cosine between `axis` and any direction within a cone of half angle asin(sin_bound)
+// Largest cosine between an axis and any direction within a cone of half angle asin(sin_bound)
 // around a direction at `cosine` to the axis.
-float widest_cosine(float cosine, float sin_bound) {
-    if (sin_bound >= 1.0f) {
-        return 1.0f;
-    }
-    const float cos_bound = safe_sqrt(1.0f - sin_bound * sin_bound);
-    if (cosine >= cos_bound) {
-        return 1.0f;
-    }
-    return cosine * cos_bound + safe_sqrt(1.0f - cosine * cosine) * sin_bound;
-}
-
-float receiver_cosine(const LightSampleContext& context, const Vec3& direction, float sin_bound) {
-    if (context.transmits) {
-        return 1.0f;
-    }
-    return std::max(widest_cosine(glm::dot(context.n, direction), sin_bound), kMinReceiverCosine);
-}
-
-// Cosine or attenuation towards the receiver; `away` is the unit direction from the emitter to it.
-float emission_factor(const LightBound& bound, const Vec3& away, float distance, float sin_bound) {
-    const float cosine = glm::dot(bound.axis, away);
-    switch (bound.orientation) {
-        case EmitterOrientation::Any:
-            return 1.0f;
-        case EmitterOrientation::TwoSided:
-            return widest_cosine(std::abs(cosine), sin_bound);
-        case EmitterOrientation::Cone: {
-            const float inside = widest_cosine(cosine, sin_bound) - bound.cos_limit;
-            return inside > 0.0f ? std::clamp(inside / bound.cos_width, kMinConeFactor, 1.0f)
-                                 : 0.0f;
-        }
-        case EmitterOrientation::Front:
-            break;
-    }
-    if (!(cosine > 0.0f)) {
-        return 0.0f;
-    }
-    if (bound.reach == kInfinity) {
-        return widest_cosine(cosine, sin_bound);
-    }
-    // Spread: the nearest point of the emitter to the foot of the perpendicular.
-    const float height = cosine * distance;
-    const float lateral =
-        std::max(distance * safe_sqrt(1.0f - cosine * cosine) - bound.radius, 0.0f);
-    const float limit = height * bound.reach;
-    if (lateral > limit * 1.001f) {
-        return 0.0f;
-    }
-    const float lit_share = std::min(kPi * limit * limit / bound.area, 1.0f);
-    return bound.spread_scale * std::max(1.0f - lateral / limit, kMinConeFactor) * lit_share;
+inline float widest_cosine(float cosine, float sin_bound) {
+    const float cos_bound = std::sqrt(std::max(1.0f - sin_bound * sin_bound, 0.0f));
+    const float sine = std::sqrt(std::max(1.0f - cosine * cosine, 0.0f));
+    const float turned = cosine * cos_bound + sine * sin_bound;
+    const float outside = cosine >= cos_bound ? 1.0f : turned;
+    return sin_bound >= 1.0f ? 1.0f : outside;
 }
 
 }  // namespace
@@ -128,59 +86,114 @@ LightBound bound_lamp(const Lamp& lamp) {
     return bound;
 }
 
-float estimate_irradiance(const LightBound& bound, const LightSampleContext& context) {
-    if (bound.distance == EmitterDistance::Ambient) {
-        return bound.strength;
-    }
-    if (bound.distance == EmitterDistance::Distant) {
-        return bound.strength * receiver_cosine(context, bound.center, bound.radius);
-    }
-    const Vec3 to_light = bound.center - context.p;
-    const float distance2 = std::max(length_squared(to_light), 1e-20f);
-    const float inverse = 1.0f / std::sqrt(distance2);
-    const Vec3 direction = to_light * inverse;
-    const float sin_bound = bound.radius * inverse;
-    const float emitted = emission_factor(bound, -direction, distance2 * inverse, sin_bound);
-    const float received = receiver_cosine(context, direction, sin_bound);
-    // Irradiance does not exceed pi times the radiance, strength / area.
-    return bound.strength * emitted * received / std::max(distance2, bound.area * kInvPi);
-}
-
-LightSelection::LightSelection(std::vector<LightBound> bounds, float scene_radius)
-    : bounds_(std::move(bounds)) {
-    if (bounds_.size() <= kMaxEstimated) {
+LightSelection::LightSelection(std::span<const LightBound> bounds, float scene_radius)
+    : count_(static_cast<std::uint32_t>(bounds.size())) {
+    if (count_ <= kMaxEstimated) {
+        for (std::size_t i = 0; i < kMaxEstimated; ++i) {
+            set_column(i, i < count_ ? bounds[i] : LightBound{});
+        }
         return;
     }
     const float radius = std::isfinite(scene_radius) ? std::max(scene_radius, 1e-3f) : 1.0f;
     std::vector<float> strengths;
-    strengths.reserve(bounds_.size());
-    for (const LightBound& bound : bounds_) {
+    strengths.reserve(bounds.size());
+    for (const LightBound& bound : bounds) {
         const bool local = bound.distance == EmitterDistance::Local;
         strengths.push_back(bound.strength / (local ? radius * radius : 1.0f));
     }
     by_strength_ = AliasTable(strengths);
 }
 
-float LightSelection::estimate(const LightSampleContext& context,
-                               std::array<float, kMaxEstimated>& weights) const {
-    float sum = 0.0f;
-    for (std::size_t i = 0; i < bounds_.size(); ++i) {
-        weights[i] = estimate_irradiance(bounds_[i], context);
-        sum += weights[i];
+void LightSelection::set_column(std::size_t i, const LightBound& bound) {
+    Columns& c = columns_;
+    c.center_x[i] = bound.center.x;
+    c.center_y[i] = bound.center.y;
+    c.center_z[i] = bound.center.z;
+    c.axis_x[i] = bound.axis.x;
+    c.axis_y[i] = bound.axis.y;
+    c.axis_z[i] = bound.axis.z;
+    c.local[i] = bound.distance == EmitterDistance::Local ? 1.0f : 0.0f;
+    c.strength[i] = bound.strength;
+    c.radius[i] = bound.radius;
+    // Irradiance does not exceed pi times the radiance, strength / area.
+    c.min_distance2[i] = std::max(bound.area * kInvPi, 1e-20f);
+    c.min_received[i] = bound.distance == EmitterDistance::Ambient ? 1.0f : kMinReceiverCosine;
+    c.mirror[i] = bound.orientation == EmitterOrientation::TwoSided ? -1.0f : 1.0f;
+    c.cutoff[i] = bound.orientation == EmitterOrientation::Front ? 0.0f : -2.0f;
+    const bool cone = bound.orientation == EmitterOrientation::Cone;
+    const bool any = bound.orientation == EmitterOrientation::Any;
+    c.cone_limit[i] = cone ? bound.cos_limit : (any ? -3.0f : 0.0f);
+    c.cone_scale[i] = cone ? 1.0f / bound.cos_width : 1.0f;
+    c.cone_floor[i] = cone ? kMinConeFactor : 0.0f;
+    const bool spread = bound.reach < kInfinity;
+    c.spread_scale[i] = bound.spread_scale;
+    c.spread_slope[i] = spread ? 1.0f / bound.reach : 0.0f;
+    // The lit part of the emitter is a disc of radius reach times height.
+    c.lit_bias[i] = spread ? 0.0f : 1.0f;
+    c.lit_scale[i] = spread ? kPi * bound.reach * bound.reach / bound.area : 0.0f;
+}
+
+// strength x cosine there x cosine here / distance^2, with the cosines' upper bounds over a sphere
+// around the emitter. Selections instead of branches, so that the loop runs on SIMD lanes.
+float LightSelection::estimate(const LightSampleContext& context, Column& weights) const {
+    const Columns& c = columns_;
+    const float min_received = context.transmits ? 1.0f : 0.0f;
+    const Vec3 p = context.p;
+    const Vec3 n = context.n;
+    constexpr std::size_t kLanes = 8;
+    const std::size_t used = (count_ + kLanes - 1) / kLanes * kLanes;
+    for (std::size_t i = 0; i < used; ++i) {
+        const float x = c.center_x[i] - c.local[i] * p.x;
+        const float y = c.center_y[i] - c.local[i] * p.y;
+        const float z = c.center_z[i] - c.local[i] * p.z;
+        const float distance2 = std::max(x * x + y * y + z * z, 1e-20f);
+        const float distance = std::sqrt(distance2);
+        const float inverse = 1.0f / distance;
+        const float sin_bound = std::min(c.radius[i] * inverse, 1.0f);
+
+        const float here = (x * n.x + y * n.y + z * n.z) * inverse;
+        const float floor = std::max(c.min_received[i], min_received);
+        const float received = std::max(widest_cosine(here, sin_bound), floor);
+
+        const float front = -(x * c.axis_x[i] + y * c.axis_y[i] + z * c.axis_z[i]) * inverse;
+        const float there = std::max(front, front * c.mirror[i]);
+        const float inside = widest_cosine(there, sin_bound) - c.cone_limit[i];
+        const float cone = std::min(std::max(inside * c.cone_scale[i], c.cone_floor[i]), 1.0f);
+
+        // Spread: the emitter's nearest point to the foot of the perpendicular.
+        const float height = std::max(there * distance, 1e-20f);
+        const float sine = std::sqrt(std::max(1.0f - there * there, 0.0f));
+        const float lateral = std::max(distance * sine - c.radius[i], 0.0f);
+        const float slope = lateral * c.spread_slope[i] / height;
+        const float lit = std::min(c.lit_bias[i] + c.lit_scale[i] * height * height, 1.0f);
+        const float spread = c.spread_scale[i] * std::max(1.0f - slope, kMinConeFactor) * lit;
+
+        const float value =
+            c.strength[i] * received * cone * spread / std::max(distance2, c.min_distance2[i]);
+        const float in_cone = inside > 0.0f ? value : 0.0f;
+        const float in_front = front > c.cutoff[i] ? in_cone : 0.0f;
+        weights[i] = slope <= 1.001f ? in_front : 0.0f;
     }
-    return sum;
+    std::array<float, kLanes> sums{};
+    for (std::size_t i = 0; i < used; i += kLanes) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            sums[lane] += weights[i + lane];
+        }
+    }
+    return ((sums[0] + sums[4]) + (sums[2] + sums[6])) +
+           ((sums[1] + sums[5]) + (sums[3] + sums[7]));
 }
 
 std::optional<LightSelection::Choice> LightSelection::choose(const LightSampleContext& context,
                                                              double u) const {
-    if (bounds_.size() == 1) {
+    if (count_ == 1) {
         return Choice{0, 1.0f, u};
     }
     if (!by_strength_.empty()) {
         const AliasTable::Sample sample = by_strength_.sample(u);
         return Choice{sample.index, sample.pmf, sample.u};
     }
-    std::array<float, kMaxEstimated> weights;
+    Column weights;
     const float sum = estimate(context, weights);
     if (!(sum > 0.0f && sum < kInfinity)) {
         return std::nullopt;
@@ -202,13 +215,13 @@ std::optional<LightSelection::Choice> LightSelection::choose(const LightSampleCo
 }
 
 float LightSelection::pmf(const LightSampleContext& context, std::uint32_t group) const {
-    if (bounds_.size() == 1) {
+    if (count_ == 1) {
         return 1.0f;
     }
     if (!by_strength_.empty()) {
         return by_strength_.pmf(group);
     }
-    std::array<float, kMaxEstimated> weights;
+    Column weights;
     const float sum = estimate(context, weights);
     return sum > 0.0f && sum < kInfinity ? weights[group] / sum : 0.0f;
 }

@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <vector>
+#include <span>
 
 #include "lights/lamp.h"
 #include "lights/light.h"
@@ -43,9 +43,6 @@ struct LightBound {
 
 [[nodiscard]] LightBound bound_lamp(const Lamp& lamp);
 
-// Estimated irradiance, >= 0.
-[[nodiscard]] float estimate_irradiance(const LightBound& bound, const LightSampleContext& context);
-
 class LightSelection {
   public:
     static constexpr std::uint32_t kMaxEstimated = 32;
@@ -53,7 +50,7 @@ class LightSelection {
     LightSelection() = default;
 
     // `scene_radius` brings local and distant lights to one scale where strength alone decides.
-    LightSelection(std::vector<LightBound> bounds, float scene_radius);
+    LightSelection(std::span<const LightBound> bounds, float scene_radius);
 
     struct Choice {
         std::uint32_t group = 0;
@@ -61,9 +58,9 @@ class LightSelection {
         double u = 0.0;  // what is left of the random number
     };
 
-    [[nodiscard]] bool empty() const { return bounds_.empty(); }
+    [[nodiscard]] bool empty() const { return count_ == 0; }
 
-    [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(bounds_.size()); }
+    [[nodiscard]] std::uint32_t size() const { return count_; }
 
     // nullopt: nothing arrives from any group.
     [[nodiscard]] std::optional<Choice> choose(const LightSampleContext& context, double u) const;
@@ -71,11 +68,31 @@ class LightSelection {
     [[nodiscard]] float pmf(const LightSampleContext& context, std::uint32_t group) const;
 
   private:
-    // Estimates of all groups; returns their sum.
-    float estimate(const LightSampleContext& context,
-                   std::array<float, kMaxEstimated>& weights) const;
+    using Column = std::array<float, kMaxEstimated>;
 
-    std::vector<LightBound> bounds_;
+    // The bounds as one branch-free formula, in columns for SIMD; unused entries have strength 0.
+    struct Columns {
+        Column center_x{}, center_y{}, center_z{};
+        Column axis_x{}, axis_y{}, axis_z{};
+        Column local{};  // 1: seen from the receiver; 0: center is the direction
+        Column strength{};
+        Column radius{};
+        Column min_distance2{};
+        Column min_received{};  // floor of the receiver's cosine
+        Column mirror{};        // -1: both sides emit
+        Column cutoff{};        // no light below this cosine
+        Column cone_limit{}, cone_scale{}, cone_floor{};
+        Column spread_scale{}, spread_slope{};
+        Column lit_bias{}, lit_scale{};
+    };
+
+    void set_column(std::size_t i, const LightBound& bound);
+
+    // Estimates of all groups; returns their sum.
+    float estimate(const LightSampleContext& context, Column& weights) const;
+
+    std::uint32_t count_ = 0;
+    Columns columns_;
     AliasTable by_strength_;
 };
 
