@@ -10,7 +10,7 @@ namespace pharos {
 }
 
 [[nodiscard]] inline float average(const Rgb& c) {
-    return (c.x + c.y + c.z) * (1.0f / 3.0f);
+    return (c.x + c.y + c.z) / 3.0f;
 }
 
 [[nodiscard]] inline float srgb_to_linear(float v) {

@@ -70,7 +70,8 @@ std::uint64_t add_escaped_radiance(const RenderContext& context, PathBatch& batc
         for (const std::uint32_t i : batch.escaped) {
             const std::uint32_t path = batch.active[i];
             if (batch.counters[path].from_camera) {
-                batch.root_sample[batch.root[path]].alpha -= average(batch.beta[path]);
+                float& alpha = batch.root_sample[batch.root[path]].alpha;
+                alpha = std::max(0.0f, alpha - average(batch.beta[path]));
             }
         }
     }

@@ -183,6 +183,7 @@ void leave_vertex(const RenderContext& context, std::size_t s, PathBatch& batch)
         return;
     }
     batch.beta[path] *= decision.weight;
+    batch.albedo_product[path] *= decision.weight;  // expected throughput of the survivors
     std::array<std::uint32_t, kMaxCopies> slots{path};
     std::size_t count = 1;
     // Fewer free slots than copies: the weight of those that fit grows in proportion.
