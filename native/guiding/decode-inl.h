@@ -13,8 +13,9 @@ struct SmoothLimit {
 };
 
 PHAROS_SIMD_INLINE SmoothLimit smooth_limit(const V& x, float center, float half) {
-    const V u = (x - center) * (1.0f / half);
-    const V r = 1.0f / simd::sqrt<V>(1.0f + u * u);
+    const V bound = simd::broadcast<V>(1e6f);
+    const V u = (simd::min(simd::max(x, -bound), bound) - center) * (1.0f / half);
+    const V r = simd::rsqrt<V>(1.0f + u * u);
     return {center + half * u * r, r * r * r};
 }
 
@@ -56,23 +57,34 @@ struct Decoded {
 [[gnu::always_inline]] inline void decode_mu(
     const float* rows, int stride, bool sigmoid, int k, Decoded& out) {
     V v[3];
+    V raw[3];
+    const V bound = simd::broadcast<V>(sigmoid ? 20.0f : 1e4f);
     for (int axis = 0; axis < 3; ++axis) {
-        const V raw = load(rows + axis * stride);
-        if (sigmoid) {
-            const V x =
-                simd::min(simd::max(raw, simd::broadcast<V>(-20.0f)), simd::broadcast<V>(20.0f));
-            v[axis] = 1.0f - 2.0f / (1.0f + simd::exp<V>(x));
+        raw[axis] = simd::min(simd::max(load(rows + axis * stride), -bound), bound);
+    }
+    if (sigmoid) {
+        // One division for three: 1 / (1 + e) = (product of the other two) / (product of all).
+        V e[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            e[axis] = 1.0f + simd::exp_bounded<V>(raw[axis]);
+        }
+        const V all = 2.0f / (e[0] * e[1] * e[2]);
+        v[0] = 1.0f - all * (e[1] * e[2]);
+        v[1] = 1.0f - all * (e[0] * e[2]);
+        v[2] = 1.0f - all * (e[0] * e[1]);
+        for (int axis = 0; axis < 3; ++axis) {
             out.mu_slope[k][axis] = 0.5f - 0.5f * v[axis] * v[axis];
-        } else {
-            v[axis] =
-                simd::min(simd::max(raw, simd::broadcast<V>(-1e4f)), simd::broadcast<V>(1e4f));
+        }
+    } else {
+        for (int axis = 0; axis < 3; ++axis) {
+            v[axis] = raw[axis];
             out.mu_slope[k][axis] = simd::broadcast<V>(1.0f);
         }
     }
     const V length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     const auto none = length2 < 1e-10f;
-    const V inverse = simd::select(
-        none, V{}, 1.0f / simd::sqrt<V>(simd::max(length2, simd::broadcast<V>(1e-10f))));
+    const V inverse =
+        simd::select(none, V{}, simd::rsqrt<V>(simd::max(length2, simd::broadcast<V>(1e-10f))));
     out.inverse_length[k] = inverse;
     out.mu[k][0] = v[0] * inverse;
     out.mu[k][1] = v[1] * inverse;
@@ -87,7 +99,7 @@ struct Decoded {
         const float low = __builtin_logf(kMinKappa);
         const float high = __builtin_logf(config.kappa_max);
         const SmoothLimit limited = smooth_limit(x, 0.5f * (low + high), 0.5f * (high - low));
-        out.kappa[k] = simd::exp<V>(limited.value);
+        out.kappa[k] = simd::exp_bounded<V>(limited.value);
         out.log_kappa_slope[k] = limited.slope;
     } else {
         // x^2 / (1 + x^2 / max) + min
@@ -109,7 +121,7 @@ inline void decode(const float* rows, int stride, const GuidingConfig& config, D
         decode_kappa(load(rows + (4 * lobes + k) * stride), config, k, out);
     }
     const SmoothLimit limited = smooth_limit(load(rows + 5 * lobes * stride), 0.0f, kIntegralRange);
-    out.integral = simd::exp<V>(limited.value);
+    out.integral = simd::exp_bounded<V>(limited.value);
     out.log_integral_slope = limited.slope;
 }
 
@@ -173,6 +185,12 @@ PHAROS_SIMD_INLINE LossTerms relative_squared_terms(
     return {weight * slope, weight * slope, weight * loss};
 }
 
+// Gradients too small to matter become zero before they turn into denormals, which cost a hundred
+// times.
+[[gnu::always_inline]] inline void store_gradient(float* p, const V& g) {
+    store(p, simd::select(simd::abs(g) < 1e-18f, V{}, g));
+}
+
 // Gradient of one vector of records into the last layer's rows (which hold the raw outputs on
 // entry).
 struct RecordVector {
@@ -193,10 +211,11 @@ struct RecordVector {
                                                        float* rows) {
     // rho_k = pi_k p_k / p: the lobe's responsibility (guiding: d log p / d logit_j = rho_j - pi_j)
     const V responsible = densities.part[k] * share_scale;
-    store(rows + k * stride, responsible - density_share * mixture.weight[k]);
+    store_gradient(rows + k * stride, responsible - density_share * mixture.weight[k]);
     const V ratio = mixture.normalization[k] * 12.5663706f;
     const V dlogkappa = vmf::dlogpdf_dlogkappa<V>(mixture.kappa[k], ratio, densities.chord2[k]);
-    store(rows + (4 * lobes + k) * stride, responsible * dlogkappa * mixture.log_kappa_slope[k]);
+    store_gradient(rows + (4 * lobes + k) * stride,
+                   responsible * dlogkappa * mixture.log_kappa_slope[k]);
     // d log p / d mu = kappa (e - mu (mu . e)), e = w - mu, then through normalisation and
     // activation
     const V* mu = mixture.mu[k];
@@ -207,8 +226,8 @@ struct RecordVector {
     const V along = e[0] * mu[0] + e[1] * mu[1] + e[2] * mu[2];
     const V scale = responsible * mixture.kappa[k] * mixture.inverse_length[k];
     for (int axis = 0; axis < 3; ++axis) {
-        store(rows + ((1 + axis) * lobes + k) * stride,
-              scale * (e[axis] - mu[axis] * along) * mixture.mu_slope[k][axis]);
+        store_gradient(rows + ((1 + axis) * lobes + k) * stride,
+                       scale * (e[axis] - mu[axis] * along) * mixture.mu_slope[k][axis]);
     }
 }
 
@@ -232,8 +251,8 @@ inline V record_gradient(const GuidingConfig& config,
         store_lobe_gradient(
             mixture, densities, record, share_scale, density_share, k, lobes, stride, rows);
     }
-    store(rows + 5 * lobes * stride,
-          terms.log_integral * inverse_batch * mixture.log_integral_slope);
+    store_gradient(rows + 5 * lobes * stride,
+                   terms.log_integral * inverse_batch * mixture.log_integral_slope);
     return terms.loss;
 }
 

@@ -2,11 +2,18 @@
 //
 // Activations lie as rows of kStride samples: [feature][sample]. Every kernel keeps a tile of 4
 // rows x some vectors of samples in registers and broadcasts single weights.
+#undef PHAROS_VECTOR_BYTES
+#if HWY_MAX_BYTES < 16
+#define PHAROS_VECTOR_BYTES 16  // Highway's scalar fallback: every x86-64 has SSE2
+#else
+#define PHAROS_VECTOR_BYTES HWY_MAX_BYTES
+#endif
+
 namespace pharos {
 namespace HWY_NAMESPACE {
 
-using V [[gnu::vector_size(HWY_MAX_BYTES)]] = float;
-inline constexpr int kLanes = HWY_MAX_BYTES / 4;
+using V [[gnu::vector_size(PHAROS_VECTOR_BYTES)]] = float;
+inline constexpr int kLanes = PHAROS_VECTOR_BYTES / 4;
 
 PHAROS_SIMD_INLINE V load(const float* p) {
     return *reinterpret_cast<const V*>(p);
@@ -88,7 +95,7 @@ inline void encode(const NetworkView& view,
 }
 
 // Vectors of samples in a register tile: 16 accumulators with 32 registers, 8 with 16.
-inline constexpr int kForwardVectors = HWY_MAX_BYTES == 64 ? 4 : 2;
+inline constexpr int kForwardVectors = PHAROS_VECTOR_BYTES == 64 ? 4 : 2;
 
 // y = activation(W x + b); slope 1 is the identity.
 template <int kStride>
@@ -135,51 +142,59 @@ inline void layer_forward(const LayerShape& shape,
     }
 }
 
+// kRows inputs of layer_backward_inputs, from input k on.
+template <int kStride, int kRows>
+[[gnu::always_inline]] inline void backward_inputs_tile(const LayerShape& shape,
+                                                        const float* __restrict weight,
+                                                        float slope,
+                                                        const float* __restrict dy,
+                                                        const float* __restrict x,
+                                                        float* __restrict dx) {
+    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
+    const int inputs = shape.inputs;
+    for (int s = 0; s < kStride; s += kVectors * kLanes) {
+        V sum[kRows][kVectors] = {};
+        const float* out = dy + s;
+        const float* w = weight;
+        for (int row = 0; row < shape.outputs; ++row, w += inputs, out += kStride) {
+#pragma GCC unroll 16
+            for (int v = 0; v < kVectors; ++v) {
+                const V in = load(out + v * kLanes);
+#pragma GCC unroll 16
+                for (int i = 0; i < kRows; ++i) {
+                    sum[i][v] += w[i] * in;
+                }
+            }
+        }
+#pragma GCC unroll 16
+        for (int i = 0; i < kRows; ++i) {
+#pragma GCC unroll 16
+            for (int v = 0; v < kVectors; ++v) {
+                const int at = i * kStride + s + v * kLanes;
+                const V scaled = slope * sum[i][v];
+                store(dx + at, simd::select(load(x + at) > 0.0f, sum[i][v], scaled));
+            }
+        }
+    }
+}
+
 // dx = W^T dy, times the slope where the activation x (an output of the layer below) is negative.
 template <int kStride>
 inline void layer_backward_inputs(const LayerShape& shape,
                                   const float* parameters,
                                   float slope,
-                                  const float* __restrict dy,
-                                  const float* __restrict x,
-                                  float* __restrict dx) {
-    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
-    const int inputs = shape.inputs;
-    for (int k = 0; k < inputs; k += kRowTile) {
-        const int count = std::min(kRowTile, inputs - k);
-        for (int s = 0; s < kStride; s += kVectors * kLanes) {
-            V sum[kRowTile][kVectors] = {};
-            const float* weight = parameters + shape.weights + k;
-            if (count == kRowTile) {
-                for (int row = 0; row < shape.outputs; ++row, weight += inputs) {
-#pragma GCC unroll 16
-                    for (int v = 0; v < kVectors; ++v) {
-                        const V in = load(dy + row * kStride + s + v * kLanes);
-#pragma GCC unroll 16
-                        for (int i = 0; i < kRowTile; ++i) {
-                            sum[i][v] += weight[i] * in;
-                        }
-                    }
-                }
-            } else {
-                for (int row = 0; row < shape.outputs; ++row, weight += inputs) {
-                    for (int v = 0; v < kVectors; ++v) {
-                        const V in = load(dy + row * kStride + s + v * kLanes);
-                        for (int i = 0; i < count; ++i) {
-                            sum[i][v] += weight[i] * in;
-                        }
-                    }
-                }
-            }
-            for (int i = 0; i < count; ++i) {
-                for (int v = 0; v < kVectors; ++v) {
-                    const int at = (k + i) * kStride + s + v * kLanes;
-                    const V factor = simd::select(
-                        load(x + at) > 0.0f, simd::broadcast<V>(1.0f), simd::broadcast<V>(slope));
-                    store(dx + at, sum[i][v] * factor);
-                }
-            }
-        }
+                                  const float* dy,
+                                  const float* x,
+                                  float* dx) {
+    const float* weight = parameters + shape.weights;
+    int k = 0;
+    for (; k + kRowTile <= shape.inputs; k += kRowTile) {
+        const int at = k * kStride;
+        backward_inputs_tile<kStride, kRowTile>(shape, weight + k, slope, dy, x + at, dx + at);
+    }
+    for (; k < shape.inputs; ++k) {
+        const int at = k * kStride;
+        backward_inputs_tile<kStride, 1>(shape, weight + k, slope, dy, x + at, dx + at);
     }
 }
 
@@ -195,36 +210,84 @@ PHAROS_SIMD_INLINE float sum_lanes(const V& v) {
     return lanes[0];
 }
 
+// add_pairs: a and b to [a0 + a1, a2 + a3, b0 + b1, b2 + b3] in every 128 bits.
+// add_halves: neighbouring 128-bit blocks of a, then of b, added.
+#if PHAROS_VECTOR_BYTES == 64
+PHAROS_SIMD_INLINE V add_pairs(const V& a, const V& b) {
+    return __builtin_shufflevector(
+               a, b, 0, 2, 16, 18, 4, 6, 20, 22, 8, 10, 24, 26, 12, 14, 28, 30) +
+           __builtin_shufflevector(a, b, 1, 3, 17, 19, 5, 7, 21, 23, 9, 11, 25, 27, 13, 15, 29, 31);
+}
+
+PHAROS_SIMD_INLINE V add_halves(const V& a, const V& b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27) +
+           __builtin_shufflevector(
+               a, b, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31);
+}
+#elif PHAROS_VECTOR_BYTES == 32
+PHAROS_SIMD_INLINE V add_pairs(const V& a, const V& b) {
+    return __builtin_shufflevector(a, b, 0, 2, 8, 10, 4, 6, 12, 14) +
+           __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
+}
+
+PHAROS_SIMD_INLINE V add_halves(const V& a, const V& b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) +
+           __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
+}
+#else
+PHAROS_SIMD_INLINE V add_pairs(const V& a, const V& b) {
+    return __builtin_shufflevector(a, b, 0, 2, 4, 6) + __builtin_shufflevector(a, b, 1, 3, 5, 7);
+}
+#endif
+
+// Lane i of the result is the sum over v[i]: kLanes horizontal sums at once, in a fixed order.
+PHAROS_SIMD_INLINE V sum_each(const V v[kLanes]) {
+    V quad[kLanes / 4];
+#pragma GCC unroll 4
+    for (int i = 0; i < kLanes / 4; ++i) {
+        const V* four = v + 4 * i;
+        quad[i] = add_pairs(add_pairs(four[0], four[1]), add_pairs(four[2], four[3]));
+    }
+#if PHAROS_VECTOR_BYTES == 64
+    return add_halves(add_halves(quad[0], quad[1]), add_halves(quad[2], quad[3]));
+#elif PHAROS_VECTOR_BYTES == 32
+    return add_halves(quad[0], quad[1]);
+#else
+    return quad[0];
+#endif
+}
+
 // Gradients of weights and biases: sums over the samples of dy x^T and dy.
 template <int kStride>
 inline void layer_backward_weights(const LayerShape& shape,
                                    const float* __restrict dy,
                                    const float* __restrict x,
                                    float* __restrict gradient) {
-    constexpr int kColumns = HWY_MAX_BYTES == 64 ? 4 : 2;
+    constexpr int kColumns = kLanes / kRowTile;  // a tile has as many sums as a vector has lanes
     const int inputs = shape.inputs;
     for (int row = 0; row < shape.rows; row += kRowTile) {
         const float* out = dy + row * kStride;
         float* row_gradient = gradient + shape.weights + row * inputs;
         int k = 0;
         for (; k + kColumns <= inputs; k += kColumns) {
-            V sum[kRowTile][kColumns] = {};
+            V sum[kLanes] = {};
+            const float* in = x + k * kStride;
             for (int s = 0; s < kStride; s += kLanes) {
 #pragma GCC unroll 16
                 for (int c = 0; c < kColumns; ++c) {
-                    const V in = load(x + (k + c) * kStride + s);
+                    const V a = load(in + c * kStride + s);
 #pragma GCC unroll 16
                     for (int i = 0; i < kRowTile; ++i) {
-                        sum[i][c] += load(out + i * kStride + s) * in;
+                        sum[i * kColumns + c] += load(out + i * kStride + s) * a;
                     }
                 }
             }
-#pragma GCC unroll 16
+            const V total = sum_each(sum);
+            float lanes[kLanes];
+            __builtin_memcpy(lanes, &total, sizeof(total));
             for (int i = 0; i < kRowTile; ++i) {
-#pragma GCC unroll 16
-                for (int c = 0; c < kColumns; ++c) {
-                    row_gradient[i * inputs + k + c] = sum_lanes(sum[i][c]);
-                }
+                __builtin_memcpy(
+                    row_gradient + i * inputs + k, lanes + i * kColumns, kColumns * sizeof(float));
             }
         }
         for (; k < inputs; ++k) {

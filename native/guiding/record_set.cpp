@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace pharos {
@@ -26,17 +27,18 @@ bool is_valid(const RadianceRecord& r) {
 }
 
 // radiance (* cos) / pdf: what the integral A is the mean of.
-double raw_target(const GuidingConfig& config, const RadianceRecord& r) {
-    double radiance = static_cast<double>(r.radiance_cos);
+float raw_target(const GuidingConfig& config, const RadianceRecord& r) {
+    float radiance = r.radiance_cos;
     if (!config.target_cosine) {
-        radiance /= std::max(static_cast<double>(std::abs(glm::dot(r.normal, r.wi))), 1e-2);
+        radiance /= std::max(std::abs(glm::dot(r.normal, r.wi)), 1e-2f);
     }
-    return radiance / static_cast<double>(r.pdf);
+    return std::min(radiance / r.pdf, std::numeric_limits<float>::max());
 }
 
 struct OrderedRecord {
     std::uint64_t hash;
     std::uint32_t index;
+    float target;  // raw, not in units of the scale
 };
 
 // Sorts by hash: one pass over buckets of the top bits, then each small bucket.
@@ -65,11 +67,11 @@ void sort_by_hash(std::vector<OrderedRecord>& records) {
 }
 
 // Mean with outliers cut at 1000 medians of the positive values, 0 without any.
-float robust_mean(const std::vector<double>& targets) {
-    std::vector<double> positive;
-    for (const double t : targets) {
-        if (t > 0.0) {
-            positive.push_back(t);
+float robust_mean(const std::vector<OrderedRecord>& records) {
+    std::vector<float> positive;
+    for (const OrderedRecord& r : records) {
+        if (r.target > 0.0f) {
+            positive.push_back(r.target);
         }
     }
     if (positive.empty()) {
@@ -77,31 +79,31 @@ float robust_mean(const std::vector<double>& targets) {
     }
     const auto middle = positive.begin() + static_cast<std::ptrdiff_t>(positive.size() / 2);
     std::nth_element(positive.begin(), middle, positive.end());
-    const double limit = 1000.0 * *middle;
+    const double limit = 1000.0 * static_cast<double>(*middle);
     double sum = 0.0;
-    for (const double t : targets) {
-        sum += std::min(t, limit);
+    for (const OrderedRecord& r : records) {
+        sum += std::min(static_cast<double>(r.target), limit);
     }
-    return static_cast<float>(std::clamp(sum / static_cast<double>(targets.size()), 1e-30, 1e30));
+    return static_cast<float>(std::clamp(sum / static_cast<double>(records.size()), 1e-30, 1e30));
 }
 
-float update_scale(const std::vector<double>& targets, float scale) {
+float update_scale(const std::vector<OrderedRecord>& records, float scale) {
     if (scale > 0.0f) {
         const double limit = 1e6 * static_cast<double>(scale);
         double sum = 0.0;
-        for (const double t : targets) {
-            sum += std::min(t, limit);
+        for (const OrderedRecord& r : records) {
+            sum += std::min(static_cast<double>(r.target), limit);
         }
-        const double mean = sum / std::max<double>(1.0, static_cast<double>(targets.size()));
+        const double mean = sum / std::max<double>(1.0, static_cast<double>(records.size()));
         const double ratio = mean / static_cast<double>(scale);
         if (ratio > 1e-4 && ratio < 1e4) {
             return scale;
         }
-        const float measured = robust_mean(targets);
+        const float measured = robust_mean(records);
         const bool left = measured > 0.0f && (measured > 1e4f * scale || measured < 1e-4f * scale);
         return left ? measured : scale;
     }
-    return robust_mean(targets);
+    return robust_mean(records);
 }
 
 }  // namespace
@@ -152,16 +154,13 @@ void prepare_records(const GuidingConfig& config,
         if (is_valid(records[i])) {
             order.push_back(
                 {mix_bits(records[i].key + 0x9e3779b97f4a7c15ull * (config.seed + 1ull)),
-                 static_cast<std::uint32_t>(i)});
+                 static_cast<std::uint32_t>(i),
+                 raw_target(config, records[i])});
         }
     }
     out.invalid = records.size() - order.size();
     sort_by_hash(order);
-    std::vector<double> targets(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        targets[i] = raw_target(config, records[order[i].index]);
-    }
-    out.scale = update_scale(targets, scale);
+    out.scale = update_scale(order, scale);
     // Which set a record goes to, by bits of its own: 0 dropped, 1 training, 2 held out.
     const auto held_out_limit =
         static_cast<std::uint64_t>(static_cast<double>(config.held_out) * 0x1p32);
@@ -171,7 +170,8 @@ void prepare_records(const GuidingConfig& config,
     std::size_t count[3] = {};
     for (std::size_t i = 0; i < order.size(); ++i) {
         const bool held_out = (order[i].hash & 0xffffffffull) < held_out_limit;
-        const bool thinned = targets[i] == 0.0 && (mix_bits(order[i].hash) >> 32) >= keep_limit;
+        const bool thinned =
+            order[i].target == 0.0f && (mix_bits(order[i].hash) >> 32) >= keep_limit;
         destination[i] = held_out ? 2 : (thinned ? 0 : 1);
         ++count[destination[i]];
     }
@@ -185,11 +185,10 @@ void prepare_records(const GuidingConfig& config,
         if (destination[i] == 0) {
             continue;
         }
-        const double unit = targets[i] / static_cast<double>(out.scale);
-        const auto target = static_cast<float>(std::min(unit, static_cast<double>(kTargetLimit)));
+        const float target = std::min(order[i].target / out.scale, kTargetLimit);
         RecordSet& set = destination[i] == 1 ? out.training : out.held_out;
         const float weight =
-            destination[i] == 1 && targets[i] == 0.0 ? 1.0f / config.zero_keep : 1.0f;
+            destination[i] == 1 && order[i].target == 0.0f ? 1.0f / config.zero_keep : 1.0f;
         set.set(next[destination[i]]++, records[order[i].index], target, weight);
     }
 }
