@@ -115,4 +115,3 @@ def material_samples_emission(material) -> bool:
     if hasattr(cycles, "emission_sampling"):
         return cycles.emission_sampling != "NONE"
     return getattr(cycles, "sample_as_light", True)
-

@@ -39,7 +39,8 @@ def take_dump(module, description, scene, view_layer) -> bool:
     only = bool(_request.path)
     template = _request.path or handlers.dump_argument()
     if template:
-        several = sum(layer.use for layer in scene.view_layers) > 1
+        # An evaluated scene may hold but the layer that is rendered.
+        several = sum(layer.use for layer in scene.original.view_layers) > 1
         path = dump_path(template, scene.frame_current, view_layer.name if several else "")
         try:
             module.write_dump(description, path)

@@ -14,7 +14,6 @@ import tempfile
 import traceback
 from pathlib import Path
 
-import addon_utils
 import bpy
 import numpy as np
 
@@ -32,6 +31,7 @@ def say(line: str) -> None:
 
 
 def enable_addon():
+    addon_utils = importlib.import_module("addon_utils")  # on the path once bpy is there
     addon_utils.enable("pharos", default_set=False)
     return importlib.import_module("pharos")
 

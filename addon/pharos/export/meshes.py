@@ -9,7 +9,6 @@ import numpy as np
 
 from .. import compat
 
-MESH_TYPES = {"MESH", "CURVE", "FONT", "META", "SURFACE"}
 _DOMAINS = {"FACE": "Face", "POINT": "Vertex", "CORNER": "Corner"}
 
 
@@ -26,8 +25,8 @@ class MeshArrays(NamedTuple):
 
 @contextmanager
 def evaluated_mesh(obj):
-    """The mesh of an evaluated object; None where it has no surface."""
-    if obj.type == "MESH" and not obj.data.is_editmode:
+    """The mesh of an evaluated object, also while it is edited; None where it has no surface."""
+    if not obj.data.is_editmode:
         yield obj.data
         return
     try:

@@ -151,7 +151,9 @@ def _image(f, node, scope, socket):
 def _environment(f, node, scope, socket):
     def make():
         direction = _vector_or(f, node, scope, lambda: _direction(f))
-        return f.program.op("EnvironmentImage", [direction], 4, _image_use(f, node, node.projection))
+        return f.program.op(
+            "EnvironmentImage", [direction], 4, _image_use(f, node, node.projection)
+        )
 
     return _memoised_image(f, node, scope, make)
 

@@ -50,7 +50,9 @@ def _active_link(socket):
 
 def _group_output(tree):
     outputs = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
-    return next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
+    return next(
+        (node for node in outputs if node.is_active_output), outputs[0] if outputs else None
+    )
 
 
 def _muted_input(node, socket):

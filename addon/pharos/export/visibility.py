@@ -35,9 +35,7 @@ class Visibility:
 
     def name_unsupported(self, obj) -> None:
         """Report what a surface should do besides hiding from rays."""
-        if obj.is_holdout or (
-            self._asks_holdout and obj.holdout_get(view_layer=self._view_layer)
-        ):
+        if obj.is_holdout or (self._asks_holdout and obj.holdout_get(view_layer=self._view_layer)):
             self._report.warn(obj.name, "Holdout is not supported.")
         if obj.is_shadow_catcher:
             self._report.warn(obj.name, "Shadow catcher is not supported.")

@@ -15,9 +15,7 @@ _VISIBILITY = (
 
 def _visibility_bits(native, world) -> int:
     settings = getattr(world, "cycles_visibility", None)
-    return sum(
-        getattr(native, bit) for name, bit in _VISIBILITY if getattr(settings, name, True)
-    )
+    return sum(getattr(native, bit) for name, bit in _VISIBILITY if getattr(settings, name, True))
 
 
 def export_world(context) -> None:

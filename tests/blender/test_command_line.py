@@ -1,0 +1,150 @@
+"""Blender started as programs start it: progress lines, dumps by argument, signals, exit codes."""
+# hosts: driver
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+FOLDER = Path(tempfile.mkdtemp(prefix="pharos_test_"))
+BLENDER = os.environ["BLENDER"]
+_SCENE = f"""
+import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})
+import bpy, harness
+harness.enable_addon()
+scene = harness.new_scene(320, 240, int(sys.argv[-1]))
+harness.add_camera()
+harness.add_object(harness.plane_mesh(half=10.0), harness.emission((0.18, 0.18, 0.18)))
+if sys.argv[-2] == "no_camera":
+    scene.camera = None
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-3])
+"""
+
+
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def make_scene(name: str, samples: int, kind: str = "plain") -> Path:
+    path = FOLDER / f"{name}.blend"
+    script = FOLDER / "make.py"
+    script.write_text(_SCENE, encoding="utf-8")
+    subprocess.run(
+        [BLENDER, "-b", "--factory-startup", "--python-exit-code", "3", "--python", str(script)]
+        + ["--", str(path), kind, str(samples)],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    return path
+
+
+def start(scene: Path, *arguments: str, **variables: str) -> subprocess.Popen:
+    env = {**os.environ, "PHAROS_PROGRESS": "1", **variables}
+    command = [BLENDER, "-b", "--factory-startup", "--addons", "pharos", str(scene), *arguments]
+    return subprocess.Popen(
+        command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+_LINE = re.compile(
+    r"^pharos: (\d+) % (\d+)/(\d+) samples [\d.]+ s left noise [\d.e+-]+$", re.MULTILINE
+)
+
+
+def test_progress_lines_and_exit_code():
+    scene = make_scene("short", 8)
+    process = start(scene, "-o", str(FOLDER / "short_####"), "-F", "OPEN_EXR", "-x", "1", "-f", "1")
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, text
+    lines = _LINE.findall(text)
+    assert lines and lines[-1] == ("100", "8", "8"), text
+    assert (FOLDER / "short_0001.exr").exists()
+
+
+def test_no_camera_fails():
+    process = start(make_scene("blind", 8, "no_camera"), "-o", str(FOLDER / "blind_"), "-f", "1")
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode != 0 and "camera" in text.lower(), (process.returncode, text)
+
+
+def test_dump_by_argument_alone():
+    dump = FOLDER / "scene.pharos"
+    process = start(make_scene("dumped", 8), "--", "--pharos-dump", str(dump))
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode == 0 and dump.exists() and not _LINE.findall(text), text
+
+
+def test_dump_beside_a_render():
+    dump = FOLDER / "beside_##.pharos"
+    output = str(FOLDER / "beside_####")
+    process = start(
+        make_scene("beside", 8),
+        "-o",
+        output,
+        "-F",
+        "OPEN_EXR",
+        "-x",
+        "1",
+        "-f",
+        "1",
+        "--",
+        "--pharos-dump",
+        str(dump),
+    )
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode == 0 and (FOLDER / "beside_01.pharos").exists(), text
+    assert (FOLDER / "beside_0001.exr").exists(), text
+
+
+def _interrupted(number: int) -> tuple[int, float, Path, str]:
+    partial = FOLDER / f"partial_{number}.exr"
+    scene = make_scene("long", 1 << 20)
+    process = start(scene, "-o", str(FOLDER / "long_"), "-f", "1", PHAROS_PARTIAL=str(partial))
+    seen = ""
+    for line in process.stdout:
+        seen += line
+        found = _LINE.match(line)
+        if found and int(found.group(2)) > 0:
+            break
+    time.sleep(0.5)
+    began = time.monotonic()
+    process.send_signal(number)
+    rest, _ = process.communicate(timeout=60)
+    return process.returncode, time.monotonic() - began, partial, seen + rest
+
+
+def test_sigterm_keeps_the_picture():
+    code, seconds, partial, text = _interrupted(signal.SIGTERM)
+    say(f"MEASURED SIGTERM to end: {seconds:.2f} s")
+    assert code == 143 and partial.exists() and seconds < 5.0, (code, seconds, text[-2000:])
+
+
+def test_ctrl_c_keeps_the_picture():
+    code, seconds, partial, text = _interrupted(signal.SIGINT)
+    say(f"MEASURED Ctrl-C to end: {seconds:.2f} s")
+    assert code != 0 and partial.exists() and seconds < 5.0, (code, seconds, text[-2000:])
+
+
+def main() -> int:
+    failed = 0
+    for name, function in list(globals().items()):
+        if not name.startswith("test_"):
+            continue
+        try:
+            function()
+            say(f"PASS {name}")
+        except Exception as error:
+            failed += 1
+            traceback.print_exc()
+            say(f"FAIL {name}: {type(error).__name__}: {error}"[:500])
+    return 1 if failed else 0
+
+
+sys.exit(main())
