@@ -9,7 +9,7 @@
 //   S_a += w [ N_a^2 + (pa / p_used) (2 N_a B_a + B_a^2) ],  w = (lum(T) / I_pixel)^2.
 // A cell turns on when S_0 / n - S_a / n exceeds the cost of guiding in units of the picture's
 // variance per unit of work, with hysteresis and a confidence margin, so that one firefly decides
-// nothing. Deterministic: records are sorted by key, sums are double.
+// nothing. Deterministic: a pass adds up whole numbers, so the order of records does not matter.
 #pragma once
 
 #include <cstdint>

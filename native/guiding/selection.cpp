@@ -1,0 +1,434 @@
+#include "guiding/selection.h"
+
+#include <array>
+#include <cmath>
+
+namespace pharos {
+
+namespace {
+
+constexpr int kGrid = 32;
+constexpr int kParentGrid = kGrid / 4;
+constexpr int kDirections = 6 * 2;  // dominant normal axis x glossy or not
+constexpr std::size_t kCells = std::size_t{kGrid} * kGrid * kGrid * kDirections;
+constexpr std::size_t kParents = std::size_t{kParentGrid} * kParentGrid * kParentGrid * kDirections;
+constexpr std::uint32_t kUntouched = 0xffffffffu;
+
+constexpr int kShares = 4;
+constexpr std::array<float, kShares> kShare = {0.0f, 0.25f, 0.5f, 0.75f};
+
+constexpr double kDecay = 0.9;         // of all sums, a pass
+constexpr double kPriorCount = 128.0;  // weight of the parent in a cell's mean, and so on up
+constexpr double kMaxMoment = 50.0;    // of one record, in units of the picture's variance
+constexpr double kGuideCost = 200.0;   // counted work: of a guided vertex, beyond
+constexpr double kVertexCost = 600.0;  // that of any vertex
+constexpr double kCostShare = 0.7;     // how much of its cost a cell's gain must repay
+constexpr double kStay = 0.8;          // hysteresis: a cell that is on stays on with less,
+constexpr double kEnter = 1.2;         // and one that is off needs more
+constexpr double kConfidence = 0.5;    // standard errors taken off the gain before it counts
+constexpr double kKeepShare = 1.03;    // another share must be this much better
+constexpr double kOverrideOn = 0.45;   // guided everywhere once so many vertices are in on-cells
+constexpr double kOverrideOff = 0.3;
+constexpr double kGateShare = 0.12;       // nearly nothing is on: the whole machinery closes
+constexpr std::uint32_t kGatePasses = 9;  // after so many judged passes
+constexpr std::uint32_t kProbeEvery = 64;
+constexpr std::uint32_t kProbePasses = 2;
+
+// Sums of a pass are whole numbers of these units (of the variance and its square), so that the
+// order of records does not matter.
+constexpr double kMomentUnit = 0x1p-32;
+constexpr double kSquareUnit = 0x1p-20;
+
+// Sums over records: second moments per share, squares of the differences to share 0, count.
+struct Moments {
+    std::array<double, kShares> moment{};
+    std::array<double, kShares> square{};
+    double count = 0.0;
+
+    void add(const Moments& other, double scale) {
+        for (std::size_t a = 0; a < kShares; ++a) {
+            moment[a] += scale * other.moment[a];
+            square[a] += scale * other.square[a];
+        }
+        count += scale * other.count;
+    }
+
+    void decay() {
+        for (std::size_t a = 0; a < kShares; ++a) {
+            moment[a] *= kDecay;
+            square[a] *= kDecay;
+        }
+        count *= kDecay;
+    }
+};
+
+struct PassSums {
+    std::array<std::int64_t, kShares> moment{};
+    std::array<std::int64_t, kShares> square{};
+    std::int64_t count = 0;
+
+    void add(const PassSums& other) {
+        for (std::size_t a = 0; a < kShares; ++a) {
+            moment[a] += other.moment[a];
+            square[a] += other.square[a];
+        }
+        count += other.count;
+    }
+
+    [[nodiscard]] Moments moments(double variance) const {
+        Moments out;
+        for (std::size_t a = 0; a < kShares; ++a) {
+            out.moment[a] = static_cast<double>(moment[a]) * kMomentUnit * variance;
+            out.square[a] = static_cast<double>(square[a]) * kSquareUnit * variance * variance;
+        }
+        out.count = static_cast<double>(count);
+        return out;
+    }
+};
+
+// Second moments of one record's estimate for each share, times its weight (selection.h).
+std::array<double, kShares> record_moments(const SelectionRecord& r) {
+    std::array<double, kShares> out{};
+    for (std::size_t i = 0; i < kShares; ++i) {
+        const auto a = static_cast<double>(kShare[i]);
+        const auto mix = [a](float guide, float bsdf) {
+            return a * static_cast<double>(guide) + (1.0 - a) * static_cast<double>(bsdf);
+        };
+        const double light_pdf =
+            static_cast<double>(r.nee_pdf_light) + mix(r.nee_pdf_guide, r.nee_pdf_bsdf);
+        const double n =
+            r.nee_radiance > 0.0f ? static_cast<double>(r.nee_radiance) / light_pdf : 0.0;
+        const double p = mix(r.pdf_guide, r.pdf_bsdf);
+        const double hit = r.hit_radiance > 0.0f ? static_cast<double>(r.hit_radiance) /
+                                                       (static_cast<double>(r.hit_pdf_light) + p)
+                                                 : 0.0;
+        // (p / p_used) (2 N B + B^2) with B = hit + fL / p, arranged so that p = 0 needs no care
+        // where nothing arrived.
+        const double indirect = r.indirect > 0.0f ? static_cast<double>(r.indirect) / p : 0.0;
+        const double b = hit + indirect;
+        const double along =
+            b > 0.0 ? p / static_cast<double>(r.pdf_used) * (2.0 * n * b + b * b) : 0.0;
+        out[i] = static_cast<double>(r.weight) * (n * n + along);
+    }
+    return out;
+}
+
+bool is_valid(const SelectionRecord& r) {
+    return is_finite(r.position) && is_finite(r.normal) && r.weight > 0.0f && r.pdf_used > 0.0f &&
+           std::isfinite(r.weight) && std::isfinite(r.pdf_used);
+}
+
+// What a decision needs: means after shrinkage, and the standard errors of the gains.
+struct Estimate {
+    std::array<double, kShares> mean{};
+    std::array<double, kShares> gain_error{};
+};
+
+// Means over `own` and kPriorCount records' worth of `above`.
+Moments shrink(const Moments& own, const Moments& above) {
+    Moments out = own;
+    if (above.count > 0.0) {
+        out.add(above, kPriorCount / above.count);
+    }
+    return out;
+}
+
+// `records` is how many records really stand behind the means.
+Estimate estimate(const Moments& shrunk, double records) {
+    Estimate out;
+    const double unit = 1.0 / std::max(shrunk.count, 1e-12);
+    for (std::size_t a = 0; a < kShares; ++a) {
+        out.mean[a] = shrunk.moment[a] * unit;
+    }
+    for (std::size_t a = 0; a < kShares; ++a) {
+        const double gain = out.mean[0] - out.mean[a];
+        const double variance = std::max(shrunk.square[a] * unit - gain * gain, 0.0);
+        out.gain_error[a] = std::sqrt(variance / std::max(records, 1.0));
+    }
+    return out;
+}
+
+// Index of the share for the next pass, from the one in use.
+std::uint8_t decide(const Estimate& e, std::uint8_t current, double threshold) {
+    std::uint8_t best = 1;
+    for (std::uint8_t a = 2; a < kShares; ++a) {
+        best = e.mean[a] < e.mean[best] ? a : best;
+    }
+    if (current > 0 && e.mean[current] <= kKeepShare * e.mean[best]) {
+        best = current;
+    }
+    const double gain = e.mean[0] - e.mean[best] - kConfidence * e.gain_error[best];
+    return gain > threshold * (current > 0 ? kStay : kEnter) ? best : std::uint8_t{0};
+}
+
+}  // namespace
+
+struct GuideSelection::Impl {
+    struct Cell {
+        std::uint32_t index = 0;
+        std::uint32_t parent = 0;
+        std::uint8_t share = 0;
+        Moments sums;
+        PassSums pass;
+    };
+
+    struct Parent {
+        std::uint8_t share = 0;
+        Moments sums;
+    };
+
+    Vec3 lower{0.0f};
+    Vec3 scale{0.0f};
+    std::vector<std::uint8_t> share;  // index into kShare, per cell: what alpha() reads
+    std::vector<std::uint32_t> slot;  // of the touched cells
+    std::vector<Cell> cells;
+    std::vector<Parent> parents;
+    Moments global;
+    double variance_sum = 0.0;
+    double variance_count = 0.0;
+    std::uint32_t judged_passes = 0;
+    std::uint32_t closed_passes = 0;
+    bool override_on = false;
+    bool closed = false;
+    std::uint32_t gate_at = kGatePasses;
+
+    [[nodiscard]] std::uint32_t cell_of(const Vec3& p, const Vec3& n, bool glossy) const;
+    Cell& touch(std::uint32_t index);
+    void add_records(std::span<const SelectionRecord> records, double variance);
+    void fold_pass(double variance);
+    void decide_parents(double threshold);
+    void decide_cells(double threshold);
+    SelectionStatistics publish();
+    void update_gate(const SelectionStatistics& statistics);
+};
+
+// Position, then dominant axis with its sign, then glossy. Non-finite input lands in some cell.
+std::uint32_t GuideSelection::Impl::cell_of(const Vec3& p, const Vec3& n, bool glossy) const {
+    std::uint32_t index = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const float x = (p[axis] - lower[axis]) * scale[axis];
+        const float limited = x > 0.0f ? std::min(x, static_cast<float>(kGrid - 1)) : 0.0f;
+        index = index * kGrid + static_cast<std::uint32_t>(limited);
+    }
+    const Vec3 size = glm::abs(n);
+    const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+    const auto direction = static_cast<std::uint32_t>(2 * axis + (n[axis] < 0.0f ? 1 : 0));
+    return (index * 6 + direction) * 2 + (glossy ? 1 : 0);
+}
+
+namespace {
+
+std::uint32_t parent_of(std::uint32_t cell) {
+    const std::uint32_t direction = cell % kDirections;
+    const std::uint32_t position = cell / kDirections;
+    const std::uint32_t x = position / (kGrid * kGrid) / 4;
+    const std::uint32_t y = position / kGrid % kGrid / 4;
+    const std::uint32_t z = position % kGrid / 4;
+    return ((x * kParentGrid + y) * kParentGrid + z) * kDirections + direction;
+}
+
+// The 64 cells of a parent, one after the other.
+template <class Visit>
+void for_each_child(std::uint32_t parent, const Visit& visit) {
+    const std::uint32_t direction = parent % kDirections;
+    const std::uint32_t position = parent / kDirections;
+    const std::uint32_t x = position / (kParentGrid * kParentGrid) * 4;
+    const std::uint32_t y = position / kParentGrid % kParentGrid * 4;
+    const std::uint32_t z = position % kParentGrid * 4;
+    for (std::uint32_t i = 0; i < 64; ++i) {
+        const std::uint32_t cell = ((x + i / 16) * kGrid + y + i / 4 % 4) * kGrid + z + i % 4;
+        visit(cell * kDirections + direction);
+    }
+}
+
+}  // namespace
+
+GuideSelection::Impl::Cell& GuideSelection::Impl::touch(std::uint32_t index) {
+    if (slot[index] == kUntouched) {
+        slot[index] = static_cast<std::uint32_t>(cells.size());
+        Cell cell;
+        cell.index = index;
+        cell.parent = parent_of(index);
+        cell.share = parents[cell.parent].share;
+        cells.push_back(cell);
+    }
+    return cells[slot[index]];
+}
+
+void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records, double variance) {
+    for (const SelectionRecord& r : records) {
+        if (!is_valid(r)) {
+            continue;
+        }
+        std::array<double, kShares> x = record_moments(r);
+        double largest = 0.0;
+        bool finite = true;
+        for (const double value : x) {
+            finite = finite && std::isfinite(value);
+            largest = std::max(largest, value);
+        }
+        if (!finite) {
+            continue;
+        }
+        // One record counts for 50 variances at most: its four moments shrink together.
+        const double unit =
+            std::min(1.0, kMaxMoment * variance / std::max(largest, 1e-300)) / variance;
+        PassSums& sums = touch(cell_of(r.position, r.normal, r.glossy)).pass;
+        ++sums.count;
+        for (std::size_t a = 0; a < kShares; ++a) {
+            const double value = x[a] * unit;
+            const double gain = x[0] * unit - value;
+            sums.moment[a] += static_cast<std::int64_t>(value / kMomentUnit + 0.5);
+            sums.square[a] += static_cast<std::int64_t>(gain * gain / kSquareUnit + 0.5);
+        }
+    }
+}
+
+// Older passes fade, the new one joins: in cells, parents and the global sum. Cells are visited in
+// order of first touch, which is not canonical: parents therefore add up whole numbers first.
+void GuideSelection::Impl::fold_pass(double variance) {
+    std::vector<PassSums> parent_pass(parents.size());
+    PassSums global_pass;
+    for (Cell& cell : cells) {
+        cell.sums.decay();
+        if (cell.pass.count > 0) {
+            cell.sums.add(cell.pass.moments(variance), 1.0);
+            parent_pass[cell.parent].add(cell.pass);
+            global_pass.add(cell.pass);
+            cell.pass = {};
+        }
+    }
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+        parents[i].sums.decay();
+        parents[i].sums.add(parent_pass[i].moments(variance), 1.0);
+    }
+    global.decay();
+    global.add(global_pass.moments(variance), 1.0);
+}
+
+// A parent's decision stands for its cells that no record has visited.
+void GuideSelection::Impl::decide_parents(double threshold) {
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+        Parent& parent = parents[i];
+        if (parent.sums.count < 1.0) {
+            continue;
+        }
+        const Moments shrunk = shrink(parent.sums, global);
+        const double records = parent.sums.count + std::min(global.count, kPriorCount);
+        const std::uint8_t next = decide(estimate(shrunk, records), parent.share, threshold);
+        if (next != parent.share) {
+            parent.share = next;
+            for_each_child(static_cast<std::uint32_t>(i), [&](std::uint32_t child) {
+                if (slot[child] == kUntouched) {
+                    share[child] = next;
+                }
+            });
+        }
+    }
+}
+
+void GuideSelection::Impl::decide_cells(double threshold) {
+    for (Cell& cell : cells) {
+        const Parent& parent = parents[cell.parent];
+        const Moments above = shrink(parent.sums, global);
+        const Moments shrunk = shrink(cell.sums, above);
+        const double records = cell.sums.count + std::min(parent.sums.count, kPriorCount);
+        cell.share = decide(estimate(shrunk, records), cell.share, threshold);
+        share[cell.index] = cell.share;
+    }
+}
+
+SelectionStatistics GuideSelection::Impl::publish() {
+    SelectionStatistics statistics;
+    // Counts are decayed whole numbers; the order of cells is not fixed, so the sums are rounded
+    // ones.
+    std::int64_t on = 0;
+    std::int64_t all = 0;
+    for (const Cell& cell : cells) {
+        const auto count = static_cast<std::int64_t>(cell.sums.count / kSquareUnit);
+        all += count;
+        on += cell.share > 0 ? count : 0;
+        statistics.cells_on += cell.share > 0 ? 1 : 0;
+    }
+    statistics.cells = static_cast<std::uint32_t>(cells.size());
+    const double on_share = all > 0 ? static_cast<double>(on) / static_cast<double>(all) : 0.0;
+    override_on = on_share > (override_on ? kOverrideOff : kOverrideOn);
+    statistics.guided_share = override_on ? 1.0 : on_share;
+    double best = 1.0;
+    for (std::size_t a = 1; a < kShares && global.moment[0] > 0.0; ++a) {
+        best = std::min(best, global.moment[a] / global.moment[0]);
+    }
+    statistics.moment_ratio = best;
+    return statistics;
+}
+
+// Closes when nearly nothing is on; opens again for two passes in 64 that it is told of.
+void GuideSelection::Impl::update_gate(const SelectionStatistics& statistics) {
+    if (judged_passes >= gate_at && statistics.guided_share < kGateShare) {
+        closed = true;
+        closed_passes = 0;
+    }
+}
+
+GuideSelection::GuideSelection(const Bounds3& scene_box) : impl_(std::make_unique<Impl>()) {
+    if (!scene_box.empty() && is_finite(scene_box.lower) && is_finite(scene_box.upper)) {
+        impl_->lower = scene_box.lower;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float extent = scene_box.upper[axis] - scene_box.lower[axis];
+            impl_->scale[axis] = extent > 1e-30f ? static_cast<float>(kGrid) / extent : 0.0f;
+        }
+    }
+    impl_->share.assign(kCells, 0);
+    impl_->slot.assign(kCells, kUntouched);
+    impl_->parents.resize(kParents);
+}
+
+GuideSelection::~GuideSelection() = default;
+GuideSelection::GuideSelection(GuideSelection&&) noexcept = default;
+GuideSelection& GuideSelection::operator=(GuideSelection&&) noexcept = default;
+
+float GuideSelection::alpha(const Vec3& position, const Vec3& normal, bool glossy) const {
+    if (impl_->closed) {
+        return 0.0f;
+    }
+    const float share = kShare[impl_->share[impl_->cell_of(position, normal, glossy)]];
+    return impl_->override_on ? std::max(share, kShare[1]) : share;
+}
+
+SelectionStatistics GuideSelection::update(std::span<const SelectionRecord> records,
+                                           const SelectionPass& pass) {
+    Impl& s = *impl_;
+    if (s.closed && ++s.closed_passes >= kProbeEvery) {
+        s.closed = false;
+        s.gate_at = s.judged_passes + kProbePasses;
+    }
+    if (std::isfinite(pass.relative_variance) && pass.relative_variance > 0.0 && pass.paths > 0.0) {
+        s.variance_sum = kDecay * s.variance_sum + pass.relative_variance * pass.paths;
+        s.variance_count = kDecay * s.variance_count + pass.paths;
+    }
+    SelectionStatistics statistics;
+    if (!s.closed && !records.empty() && s.variance_count > 0.0 && pass.vertices > 0.0) {
+        const double variance = s.variance_sum / s.variance_count;
+        s.add_records(records, variance);
+        s.fold_pass(variance);
+        ++s.judged_passes;
+        const double path_cost = pass.vertices / pass.paths * kVertexCost;
+        const double threshold =
+            kCostShare * variance * kGuideCost / std::max(path_cost, kVertexCost);
+        s.decide_parents(threshold);
+        s.decide_cells(threshold);
+        statistics = s.publish();
+        s.update_gate(statistics);
+    }
+    statistics.closed = s.closed;
+    if (s.closed) {
+        statistics.guided_share = 0.0;
+    }
+    return statistics;
+}
+
+bool GuideSelection::closed() const {
+    return impl_->closed;
+}
+
+}  // namespace pharos
