@@ -1,5 +1,6 @@
 #include "geometry/accelerator.h"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -13,6 +14,7 @@
 #include <utility>
 
 #include <embree3/rtcore.h>
+#include <xmmintrin.h>
 
 #include "core/check.h"
 #include "core/fp_state.h"
@@ -164,19 +166,59 @@ bool traceable(const Ray& ray) {
     return zero.x + zero.y + zero.z + (ray.t_min - ray.t_min) == 0.0f && ray.t_max >= ray.t_min;
 }
 
+// Two whole-register stores: the traversal reads these members back as vectors.
 void fill(RTCRay& out, const Ray& ray, std::uint32_t mask) {
-    out.org_x = ray.origin.x;
-    out.org_y = ray.origin.y;
-    out.org_z = ray.origin.z;
-    out.tnear = ray.t_min;
-    out.dir_x = ray.direction.x;
-    out.dir_y = ray.direction.y;
-    out.dir_z = ray.direction.z;
-    out.time = 0.0f;
+    _mm_store_ps(&out.org_x, _mm_setr_ps(ray.origin.x, ray.origin.y, ray.origin.z, ray.t_min));
+    _mm_store_ps(&out.dir_x, _mm_setr_ps(ray.direction.x, ray.direction.y, ray.direction.z, 0.0f));
     out.tfar = ray.t_max;
     out.mask = mask;
     out.id = 0;
     out.flags = 0;
+}
+
+void fill(RTCRayHit& out, const Ray& ray, std::uint32_t mask) {
+    fill(out.ray, ray, mask);
+    out.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+}
+
+Hit hit_of(const RTCRayHit& query) {
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+        return Hit{};
+    }
+    const bool shared = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+    return {query.ray.tfar,
+            query.hit.u,
+            query.hit.v,
+            shared ? query.hit.instID[0] : query.hit.geomID,
+            query.hit.primID};
+}
+
+// Chunks in the order given, which Embree traverses as frusta.
+void intersect_stream(RTCScene scene,
+                      std::span<const Ray> rays,
+                      std::span<const std::uint32_t> visibility,
+                      std::span<Hit> hits) {
+    constexpr std::size_t kChunk = 64;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    std::array<RTCRayHit, kChunk> queries;
+    std::array<std::size_t, kChunk> ray_of;
+    for (std::size_t begin = 0; begin < rays.size(); begin += kChunk) {
+        unsigned count = 0;
+        for (std::size_t i = begin; i < std::min(begin + kChunk, rays.size()); ++i) {
+            hits[i] = Hit{};
+            if (traceable(rays[i])) {
+                fill(queries[count], rays[i], visibility[i]);
+                ray_of[count++] = i;
+            }
+        }
+        rtcIntersect1M(scene, &context, queries.data(), count, sizeof(RTCRayHit));
+        for (unsigned k = 0; k < count; ++k) {
+            hits[ray_of[k]] = hit_of(queries[k]);
+        }
+    }
 }
 
 // Everything a build makes. Shared with the thread that runs a long build.
@@ -364,30 +406,26 @@ Accelerator::~Accelerator() = default;
 
 void Accelerator::intersect(std::span<const Ray> rays,
                             std::span<const std::uint32_t> visibility,
-                            std::span<Hit> hits) const {
+                            std::span<Hit> hits,
+                            RayOrder order) const {
     DCHECK(visibility.size() >= rays.size() && hits.size() >= rays.size());
+    RTCScene scene = impl_->scene;
+    if (order == RayOrder::Coherent) {
+        intersect_stream(scene, rays, visibility, hits);
+        return;
+    }
+    // One by one: packets and streams of bounced rays were never faster.
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    RTCScene scene = impl_->scene;
     RTCRayHit query;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        hits[i] = Hit{};
         if (!traceable(rays[i])) {
+            hits[i] = Hit{};
             continue;
         }
-        fill(query.ray, rays[i], visibility[i]);
-        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+        fill(query, rays[i], visibility[i]);
         rtcIntersect1(scene, &context, &query);
-        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-            continue;
-        }
-        const bool shared = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
-        hits[i] = {query.ray.tfar,
-                   query.hit.u,
-                   query.hit.v,
-                   shared ? query.hit.instID[0] : query.hit.geomID,
-                   query.hit.primID};
+        hits[i] = hit_of(query);
     }
 }
 

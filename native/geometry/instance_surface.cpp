@@ -11,16 +11,19 @@ Mat3 absolute(const Mat3& m) {
 // A point's coordinates, the products of its transform and its translation all round. With a shared
 // mesh a ray's origin goes through the inverse, W (p - t), which blows the rounding of p and t up
 // by |W| and comes back through |M|.
-void set_error_bound(InstanceSurface& s, const Instance& instance, bool shared) {
+Mat4 error_bound(const Instance& instance, bool shared) {
     const Mat3 to_world = absolute(Mat3(instance.to_world));
     const Vec3 translation = glm::abs(Vec3(instance.to_world[3]));
-    s.error_matrix = to_world;
-    s.error_offset = translation;
+    Mat3 matrix = to_world;
+    Vec3 offset = translation;
     if (shared) {
         const Mat3 there_and_back = to_world * absolute(Mat3(instance.to_object));
-        s.error_matrix += there_and_back * to_world;
-        s.error_offset += 2.0f * (there_and_back * translation);
+        matrix += there_and_back * to_world;
+        offset += 2.0f * (there_and_back * translation);
     }
+    Mat4 result(matrix);
+    result[3] = Vec4(offset, 1.0f);
+    return result;
 }
 
 }  // namespace
@@ -51,10 +54,10 @@ std::vector<InstanceSurface> make_instance_surfaces(std::span<const Mesh> meshes
         s.material_slots = mesh.material_indices.empty() ? nullptr : mesh.material_indices.data();
         s.materials = instance.materials.data();
         s.slot_count = static_cast<std::uint32_t>(instance.materials.size());
-        s.mirrored = instance.mirrored;
+        s.winding = instance.mirrored ? -1.0f : 1.0f;
         s.to_world = instance.to_world;
-        s.normal_to_world = glm::transpose(Mat3(instance.to_object));
-        set_error_bound(s, instance, uses[instance.mesh] > 1);
+        s.normal_to_world = Mat4(glm::transpose(Mat3(instance.to_object)));
+        s.error_bound = error_bound(instance, uses[instance.mesh] > 1);
         surfaces.push_back(s);
     }
     return surfaces;

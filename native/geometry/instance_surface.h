@@ -15,6 +15,7 @@
 #include "core/math.h"
 #include "geometry/accelerator.h"
 #include "geometry/mesh.h"
+#include "geometry/simd_vec3.h"
 #include "geometry/surface_interaction.h"
 
 namespace pharos {
@@ -28,13 +29,13 @@ struct InstanceSurface {
     const std::uint32_t* materials = nullptr;       // of each slot
     std::uint32_t slot_count = 1;
     bool corner_normals = false;  // normals are per corner, else per vertex
-    bool mirrored = false;
+    float winding = 1.0f;         // -1: mirrored
     Mat4 to_world{1.0f};
-    Mat3 normal_to_world{1.0f};  // inverse transpose
-    // Rounding error of a traced point is some units times error_matrix |object coordinates| +
-    // error_offset: of the transform and, for a shared mesh, of bringing rays into object space.
-    Mat3 error_matrix{1.0f};
-    Vec3 error_offset;
+    Mat4 normal_to_world{1.0f};  // inverse transpose of the linear part
+    // Rounding error of a traced point is some units times what this makes of the object
+    // coordinates' absolute values: the transform's and, for a shared mesh, that of bringing rays
+    // into object space.
+    Mat4 error_bound{1.0f};
 };
 
 // One per instance, in order.
@@ -55,21 +56,19 @@ inline constexpr float kInset = 8.0f;  // error bounds between a point and its t
 
 // Bound of the distance between the point and the plane that was traced, along unit normal ng.
 [[nodiscard]] inline float surface_error_bound(const InstanceSurface& s,
-                                               const Vec3& largest,
-                                               const Vec3& edge1,
-                                               const Vec3& edge2,
-                                               const Vec3& ng,
-                                               float normal_length) {
-    const Vec3 point = s.error_matrix * largest + s.error_offset;
+                                               Simd3 largest,
+                                               Simd3 edge1,
+                                               Simd3 edge2,
+                                               Simd3 ng,
+                                               float inverse_length) {
+    const float point = dot(abs(ng), transform_point(s.error_bound, largest));
     // Rounding of the normal's products moves the plane by that share of the triangle's extent.
-    const Vec3 a = glm::abs(edge1);
-    const Vec3 b = glm::abs(edge2);
-    const Vec3 products(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
-    const Vec3 extent = glm::max(a, b);
-    const float tilt =
-        std::min(glm::dot(products, extent), kMaxTilt * normal_length * max_component(extent));
-    return kUnitRoundoff * (kPointErrorUnits * glm::dot(glm::abs(ng), point) +
-                            kPlaneErrorUnits * tilt / normal_length);
+    const Simd3 a = abs(edge1);
+    const Simd3 b = abs(edge2);
+    const Simd3 extent = max(a, b);
+    const float tilt = std::min(dot(cross_of_sums(a, b), extent) * inverse_length,
+                                kMaxTilt * max_component(extent));
+    return kUnitRoundoff * (kPointErrorUnits * point + kPlaneErrorUnits * tilt);
 }
 
 // Barycentrics moved off the triangle's edges by a multiple of the error bound. A point on an edge
@@ -95,13 +94,13 @@ struct Barycentrics {
 [[nodiscard]] inline SurfaceInteraction surface_interaction(const InstanceSurface& s,
                                                             const Ray& ray,
                                                             const Hit& hit) {
+    using detail::Simd3;
     const UVec3 corners = s.triangles[hit.triangle];
-    const Vec3 p0 = s.positions[corners.x];
-    const Vec3 p1 = s.positions[corners.y];
-    const Vec3 p2 = s.positions[corners.z];
-    const Mat3 linear(s.to_world);
-    const Vec3 e1 = p1 - p0;
-    const Vec3 e2 = p2 - p0;
+    const Simd3 p0 = Simd3::load(s.positions[corners.x]);
+    const Simd3 p1 = Simd3::load(s.positions[corners.y]);
+    const Simd3 p2 = Simd3::load(s.positions[corners.z]);
+    const Simd3 edge1 = detail::transform_vector(s.to_world, p1 - p0);
+    const Simd3 edge2 = detail::transform_vector(s.to_world, p2 - p0);
 
     SurfaceInteraction si;
     si.t = hit.t;
@@ -114,35 +113,37 @@ struct Barycentrics {
     si.material = s.materials[std::min(slot, s.slot_count - 1)];
 
     // A mirrored instance turns the winding round; its outside stays where the object's outside is.
-    const Vec3 edge1 = linear * e1;
-    const Vec3 edge2 = linear * e2;
-    Vec3 n = glm::cross(edge1, edge2);
-    if (s.mirrored) {
-        n = -n;
-    }
-    const float squared = length_squared(n);
+    const Simd3 n = cross(edge1, edge2);
+    const Simd3 wo = Simd3::load(si.wo);
+    const float squared = dot(n, n);
     const bool sound = squared > 1e-37f && squared < kInfinity;
-    const float length = sound ? std::sqrt(squared) : 1.0f;
-    si.ng = sound ? n / length : si.wo;
-    const Vec3 largest = glm::max(glm::max(glm::abs(p0), glm::abs(p1)), glm::abs(p2));
-    si.p_error = detail::surface_error_bound(s, largest, edge1, edge2, si.ng, length);
+    const float inverse_length = sound ? 1.0f / std::sqrt(squared) : 1.0f;
+    Simd3 ng = sound ? n * (inverse_length * s.winding) : wo;
+    const Simd3 largest = max(max(abs(p0), abs(p1)), abs(p2));
+    si.p_error = detail::surface_error_bound(s, largest, edge1, edge2, ng, inverse_length);
 
-    const float longest = std::sqrt(std::max(length_squared(edge1), length_squared(edge2)));
-    const float margin = std::min(detail::kInset * si.p_error * longest / length, 0.1f);
+    const float longest = 1.75f * max_component(max(abs(edge1), abs(edge2)));
+    const float margin = std::min(detail::kInset * si.p_error * longest * inverse_length, 0.1f);
     const detail::Barycentrics b = detail::inset_from_edges(hit.u, hit.v, margin);
-    si.p = linear * (p0 + (b.u * e1 + b.v * e2)) + Vec3(s.to_world[3]);
+    const Simd3 corner = detail::transform_point(s.to_world, p0);
+    si.p = (corner + (edge1 * b.u + edge2 * b.v)).store();
 
+    const float facing = dot(ng, wo);
+    const float side = facing >= 0.0f ? 1.0f : -1.0f;
+    si.front_face = facing >= 0.0f;
+    ng = ng * side;
+    si.ng = ng.store();
     si.ns = si.ng;
     if (s.normals != nullptr) {
         const UVec3 index = s.corner_normals ? 3 * hit.triangle + UVec3(0, 1, 2) : corners;
-        const Vec3 smooth = (1.0f - hit.u - hit.v) * s.normals[index.x] +
-                            hit.u * s.normals[index.y] + hit.v * s.normals[index.z];
-        si.ns = normalize_or(s.normal_to_world * smooth, si.ng);
-    }
-    si.front_face = glm::dot(si.ng, si.wo) >= 0.0f;
-    if (!si.front_face) {
-        si.ng = -si.ng;
-        si.ns = -si.ns;
+        const Simd3 smooth = Simd3::load(s.normals[index.x]) * (1.0f - hit.u - hit.v) +
+                             Simd3::load(s.normals[index.y]) * hit.u +
+                             Simd3::load(s.normals[index.z]) * hit.v;
+        const Simd3 ns = detail::transform_vector(s.normal_to_world, smooth);
+        const float length2 = dot(ns, ns);
+        if (length2 > 1e-30f && length2 < 1e30f) {
+            si.ns = (ns * (side / std::sqrt(length2))).store();
+        }
     }
     return si;
 }

@@ -1,7 +1,7 @@
 // A triangle mesh in object space: the description and what is traced are the same arrays.
 //
-// Input may hold broken indices and non-finite values; validate_mesh() (scene) mends and reports them
-// before anything else reads a mesh.
+// Input may hold broken indices and non-finite values; validate_mesh() (scene) mends and reports
+// them before anything else reads a mesh.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,9 @@ struct Mesh {
     std::vector<Vec3> positions;
     std::vector<UVec3> triangles;  // indices into positions
     NormalDomain normal_domain = NormalDomain::Face;
-    std::vector<Vec3> normals;                    // Face: empty; Vertex: positions.size(); Corner: 3 x triangles
+    std::vector<Vec3> normals;  // Face: empty; Vertex: positions.size(); Corner: 3 x triangles
     std::vector<std::uint16_t> material_indices;  // slot of each triangle; empty: all 0
-    std::vector<UvMap> uv_maps;        // first = the one rendered by default
+    std::vector<UvMap> uv_maps;                   // first = the one rendered by default
 };
 
 }  // namespace pharos

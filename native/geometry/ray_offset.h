@@ -1,7 +1,7 @@
 // Ray origins that neither hit their own surface again nor leap over a neighbour.
 //
-// Error-bound offset (Pharr, Jakob, Humphreys, PBR 4ed, section 6.8.6): along the geometric normal by
-// the bound of the hit point's rounding error, then one ulp outward in every component.
+// Error-bound offset (Pharr, Jakob, Humphreys, PBR 4ed, section 6.8.6): along the geometric normal
+// by the bound of the hit point's rounding error, then one ulp outward in every component.
 #pragma once
 
 #include <bit>
@@ -19,7 +19,10 @@ namespace pharos {
 }
 
 // `side` is any vector on the side of the surface the new ray leaves to.
-[[nodiscard]] inline Vec3 offset_ray_origin(const Vec3& p, const Vec3& ng, float p_error, const Vec3& side) {
+[[nodiscard]] inline Vec3 offset_ray_origin(const Vec3& p,
+                                            const Vec3& ng,
+                                            float p_error,
+                                            const Vec3& side) {
     const Vec3 n = glm::dot(ng, side) < 0.0f ? -ng : ng;
     Vec3 origin = p + n * p_error;
     for (int axis = 0; axis < 3; ++axis) {

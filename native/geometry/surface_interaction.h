@@ -12,11 +12,11 @@ namespace pharos {
 
 struct SurfaceInteraction {
     Vec3 p;
-    float t = 0.0f;         // distance along the ray
-    Vec3 ng;                // geometric normal, on wo's side
-    float p_error = 0.0f;   // bound of |p - exact point|, metres
-    Vec3 ns;                // shading normal (interpolated), flipped with ng
-    float u = 0.0f;         // barycentric: p = (1-u-v) p0 + u p1 + v p2
+    float t = 0.0f;        // distance along the ray
+    Vec3 ng;               // geometric normal, on wo's side
+    float p_error = 0.0f;  // bound of |p - exact point|, metres
+    Vec3 ns;               // shading normal (interpolated), flipped with ng
+    float u = 0.0f;        // barycentric: p = (1-u-v) p0 + u p1 + v p2
     Vec3 wo;
     float v = 0.0f;
     std::uint32_t instance = 0;

@@ -90,6 +90,47 @@ TEST(Accelerator, HitsAreThoseOfBruteForce) {
     EXPECT_GT(compared, 1500u);
 }
 
+// Camera rays as streams: the same hits, broken rays among them and chunks cut anywhere.
+TEST(Accelerator, CoherentRaysHitTheSame) {
+    Random random(12);
+    TestGeometry scene;
+    scene.meshes.push_back(sphere_mesh("sphere", Vec3(0), 1.0f, 40, 60));
+    scene.meshes.push_back(box_mesh("room", Vec3(-4), Vec3(4), true));
+    for (int i = 0; i < 8; ++i) {
+        scene.instances.push_back(make_instance(0, random.affine(2.0f)));
+    }
+    scene.instances.push_back(make_instance(1, Mat4(1.0f)));
+    scene.instances[3].visibility = kVisibleShadow;
+    scene.build();
+    std::vector<Ray> rays;
+    for (int y = 0; y < 100; ++y) {
+        for (int x = 0; x < 100; ++x) {
+            const Vec3 to(
+                0.01f * static_cast<float>(x - 50), 1, 0.01f * static_cast<float>(y - 50));
+            rays.push_back({Vec3(0, -3.9f, 0), glm::normalize(to)});
+            if (x % 17 == 0) {
+                rays.back().direction.z = std::numeric_limits<float>::quiet_NaN();
+            }
+        }
+    }
+    const std::vector<std::uint32_t> camera(rays.size(), kVisibleCamera);
+    const std::vector<Hit> single = scene.trace(rays, kVisibleCamera);
+    for (const std::size_t count :
+         {rays.size(), std::size_t{1}, std::size_t{63}, std::size_t{130}}) {
+        std::vector<Hit> hits(count);
+        scene.accelerator->intersect(
+            std::span(rays).first(count), camera, hits, RayOrder::Coherent);
+        for (std::size_t i = 0; i < count; ++i) {
+            ASSERT_EQ(hits[i].instance, single[i].instance) << i;
+            ASSERT_EQ(hits[i].triangle, single[i].triangle) << i;
+            if (single[i].instance != kNone) {
+                ASSERT_NEAR(hits[i].t, single[i].t, 1e-5f) << i;
+                ASSERT_NEAR(hits[i].u, single[i].u, 1e-4f) << i;
+            }
+        }
+    }
+}
+
 TEST(Accelerator, BarycentricsGiveTheHitPoint) {
     Random random(2);
     TestGeometry scene;
