@@ -6,7 +6,7 @@
 # PHAROS_ROOT: the project's folder. PHAROS_CACHE: what survives a new clone.
 PHAROS_ROOT=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 PHAROS_CACHE=${XDG_CACHE_HOME:-$HOME/.cache}/pharos
-BLENDER=${BLENDER:-blender}
+export BLENDER=${BLENDER:-blender}
 
 # Another Python's modules must not get into Blender or the virtual environment.
 unset PYTHONPATH PYTHONHOME
@@ -17,7 +17,7 @@ export CCACHE_DIR=$PHAROS_CACHE/ccache CCACHE_BASEDIR=$PHAROS_ROOT CCACHE_NOHASH
 
 PACKAGES_RENDER=(
     g++ cmake ninja-build ccache pkg-config
-    libembree-dev libopenimageio-dev libopenexr-dev libglm-dev libhwy-dev
+    libembree-dev libopenimageio-dev libglm-dev libhwy-dev
     python3 python3-dev python3-numpy pybind11-dev openimageio-tools
 )
 PACKAGES_TEST=(

@@ -9,8 +9,7 @@ describe_suites() {
 python   ruff; pytest of tests/python: layering, hygiene, benchmark metric, README commands
 format   clang-format of native/ and tests/native/
 native   the C++ unit tests (ctest without the label slow)
-blender  tests/blender in Blender 3.4.1
-bpy      tests/blender in bpy 4.5
+blender  tests/blender in Blender 3.4.1, with and without a window, and in bpy 4.5
 render   scenes/render: two pictures, a second run without building, Ctrl-C and SIGTERM
 tidy     clang-tidy; files seen before are not looked at again, within a budget of time
 asan     unit tests under the address and undefined-behaviour sanitizers
@@ -111,24 +110,8 @@ suite_native() {
     run_ctest native 900 release
 }
 
-blender_tests() {
-    local name=$1
-    shift
-    if [ ! -f "$PHAROS_ROOT/tests/blender/run_all.py" ]; then
-        count 0 1
-        echo "tests/blender/run_all.py is missing"
-        return
-    fi
-    counted "$name" 900 "$@"
-}
-
 suite_blender() {
-    blender_tests blender "$BLENDER" -b --factory-startup --addons pharos --python-exit-code 3 \
-        -P "$PHAROS_ROOT/tests/blender/run_all.py"
-}
-
-suite_bpy() {
-    blender_tests bpy "$PYTHON" "$PHAROS_ROOT/tests/blender/run_all.py"
+    counted blender 1500 /usr/bin/python3 "$PHAROS_ROOT/tests/blender/run_all.py"
 }
 
 suite_render() {
