@@ -25,7 +25,7 @@ struct LightSample {
     Vec3 wi;  // unit, from the context point to the light
     float pdf = 0.0f;
     float distance = 0.0f;  // kInfinity for sun and world
-    bool delta = false;
+    bool delta = false;     // no ray meets it by chance (also lamps without MIS): MIS weight 1
     bool cast_shadow = true;
     std::uint32_t visibility = 31;  // of the light, for the receiving lobe's type
     std::uint32_t max_bounces = 1024;

@@ -58,7 +58,8 @@ std::optional<LightSamplerSample> LightSampler::Impl::sample_lamp_group(
     result.sample.wi = sampled->wi;
     result.sample.pdf = sampled->pdf;
     result.sample.distance = sampled->distance;
-    result.sample.delta = sampled->delta;
+    // A lamp that rays never meet has no rival either: its samples keep their full weight.
+    result.sample.delta = sampled->delta || !lamp.hittable;
     result.sample.cast_shadow = lamp.cast_shadow;
     result.sample.visibility = lamp.visibility;
     result.sample.max_bounces = lamp.max_bounces;

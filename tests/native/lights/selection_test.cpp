@@ -172,6 +172,7 @@ TEST(Selection, SettingsPassThrough) {
     const LightSampler sampler = make_sampler(lamp, 405);
     const auto s = sampler.sample(test::plane_point(), 0.5f, Vec2(0.5f));
     ASSERT_TRUE(s);
+    EXPECT_TRUE(s->sample.delta);  // nothing competes with its samples
     EXPECT_FALSE(s->sample.cast_shadow);
     EXPECT_EQ(s->sample.visibility, kVisibleGlossy);
     EXPECT_EQ(s->sample.max_bounces, 3u);
