@@ -66,12 +66,8 @@ ClosureAlbedo closure_albedo(const Closure& c, const Vec3& wo) {
         case ClosureType::Translucent:
         case ClosureType::Transparent:
             return {Rgb(0.0f), c.weight};
-        case ClosureType::GgxReflection: {
-            // A compensated lobe has albedo one before Fresnel.
-            const float kept =
-                c.energy_scale == 1.0f && !is_delta(c) ? ggx_albedo(mu, closure_rough(c)) : 1.0f;
-            return {c.weight * mean_reflectance(c, mu) * kept, Rgb(0.0f)};
-        }
+        case ClosureType::GgxReflection:
+            return {c.weight * mean_reflectance(c, mu), Rgb(0.0f)};
         case ClosureType::GgxRefraction:
         case ClosureType::GgxGlass:
             return glass_albedo(c, mu);
@@ -82,6 +78,13 @@ ClosureAlbedo closure_albedo(const Closure& c, const Vec3& wo) {
                     Rgb(0.0f)};
     }
     return {};
+}
+
+float single_scatter_share(const Closure& c, const Vec3& wo) {
+    if (c.type != ClosureType::GgxReflection || c.energy_scale != 1.0f || is_delta(c)) {
+        return 1.0f;
+    }
+    return ggx_albedo(glm::dot(c.n, wo), closure_rough(c));
 }
 
 }  // namespace pharos

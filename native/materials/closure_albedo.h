@@ -32,4 +32,7 @@ struct ClosureAlbedo {
 
 [[nodiscard]] ClosureAlbedo closure_albedo(const Closure& closure, const Vec3& wo);
 
+// Share of a reflecting lobe that one bounce keeps; 1 where that is compensated or not known.
+[[nodiscard]] float single_scatter_share(const Closure& closure, const Vec3& wo);
+
 }  // namespace pharos

@@ -61,7 +61,8 @@ void set_anisotropic_roughness(Closure& c, float roughness, const Anisotropy& an
 // Makes up for what one bounce loses: the lobe is scaled by 1 / E for wo, and coloured by the mean
 // reflectance `fss` of the further bounces (Kulla, Conty 2017): f *= 1 + Fms (1 - E) / E.
 void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx);
-void preserve_glass_energy(Closure& c, const ClosureSetupContext& ctx);
+// For glass Blender colours them by the transmission tint.
+void preserve_glass_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx);
 
 // Fills the sample weight and adds the closure, unless its weight is negligible. Returns its
 // directional albedo, weight included.

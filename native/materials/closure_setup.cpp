@@ -101,32 +101,38 @@ void set_anisotropic_roughness(Closure& c, float roughness, const Anisotropy& an
         return;
     }
     const float aspect = std::sqrt(1.0f - 0.9f * amount);
-    c.alpha_x /= aspect;
+    c.alpha_x = std::min(c.alpha_x / aspect, 1.0f);  // as Cycles
     c.alpha_y *= aspect;
     const SinCos turn = sincos_turns(bounded(anisotropy.rotation, -1e3f, 1e3f));
     c.tangent = glm::normalize(tangent * turn.cos + glm::cross(c.n, tangent) * turn.sin);
 }
 
-void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx) {
-    if (is_delta(c)) {
-        return;
-    }
-    const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
-    const float e = ggx_albedo(glm::dot(c.n, ctx.wo), rough);
-    const float average_e = ggx_average_albedo(rough);
+namespace {
+
+// Kulla and Conty's further bounces on top of a lobe of albedo e (mean average_e).
+void compensate(Closure& c, const Rgb& fss, float e, float average_e) {
     const Rgb fms = fss * average_e / (Rgb(1.0f) - fss * (1.0f - average_e));
     c.energy_scale = 1.0f / e;
     c.weight *= e + fms * (1.0f - e);
     c.smith = 0;
 }
 
-void preserve_glass_energy(Closure& c, const ClosureSetupContext& ctx) {
-    if (is_delta(c)) {
-        return;
+}  // namespace
+
+void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx) {
+    if (!is_delta(c)) {
+        const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
+        const float e = ggx_albedo(glm::dot(c.n, ctx.wo), rough);
+        compensate(c, fss, e, ggx_average_albedo(rough));
     }
-    const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
-    c.energy_scale = 1.0f / ggx_glass_albedo(glm::dot(c.n, ctx.wo), rough, c.eta);
-    c.smith = 0;
+}
+
+void preserve_glass_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx) {
+    if (!is_delta(c)) {
+        const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
+        const float e = ggx_glass_albedo(glm::dot(c.n, ctx.wo), rough, c.eta);
+        compensate(c, fss, e, ggx_glass_average_albedo(rough, c.eta));
+    }
 }
 
 Rgb add_closure(Closure& c, const ClosureSetupContext& ctx, ClosureSink& sink) {
@@ -141,8 +147,9 @@ Rgb add_closure(Closure& c, const ClosureSetupContext& ctx, ClosureSink& sink) {
     }
     const ClosureAlbedo albedo = closure_albedo(c, ctx.wo);
     const Rgb sum = albedo.reflected + albedo.transmitted;
+    // What one bounce loses makes a lobe less likely, but layers below do not see it (as Cycles).
     // The floor keeps every lobe reachable, however low the estimate.
-    c.sample_weight = std::max(average(sum), 0.01f * weight);
+    c.sample_weight = std::max(average(sum) * single_scatter_share(c, ctx.wo), 0.01f * weight);
     sink.add(c);
     return sum;
 }
@@ -163,8 +170,8 @@ void add_diffuse(const DiffuseInputs& in, const ClosureSetupContext& ctx, Closur
             const float e = oren_nayar_albedo(terms, saturate(glm::dot(c.n, ctx.wo)));
             const Rgb rho = clamp_color(in.color);
             const Rgb further = Rgb(1.0f) - rho * (1.0f - average_e);
-            c.f0 = rho * (average_e * std::max(1.0f - e, 0.0f) * kInvPi / (1.0f - average_e)) /
-                   further;
+            c.f0 = rho * rho *
+                   (average_e * std::max(1.0f - e, 0.0f) * kInvPi / (1.0f - average_e)) / further;
         }
     }
     add_closure(c, ctx, sink);
@@ -224,7 +231,7 @@ void setup_glass(const ScatterInputs& in, const ClosureSetupContext& ctx, Closur
         c.fresnel = FresnelType::Dielectric;
         make_singular_without_contrast(c);
         if (multi_scatter(in.distribution)) {
-            preserve_glass_energy(c, ctx);
+            preserve_glass_energy(c, clamp_color(in.color), ctx);
         }
         add_closure(c, ctx, sink);
         return;

@@ -92,6 +92,20 @@ struct AxisPosition {
     return {lower, scaled - static_cast<float>(lower)};
 }
 
+// Cosine-weighted mean of an albedo tabled over the square root t of mu: the integral of 2 mu E dmu
+// is that of 4 t^3 E dt, by the midpoint rule on the interpolant.
+template <class Albedo>
+[[nodiscard]] float average_over_directions(const Albedo& albedo, std::size_t count) {
+    constexpr int kSteps = 256;
+    float sum = 0.0f;
+    for (int i = 0; i < kSteps; ++i) {
+        const float t = (static_cast<float>(i) + 0.5f) / static_cast<float>(kSteps);
+        const AxisPosition p = axis_position(t, count);
+        sum += 4.0f * t * t * t * lerp(albedo(p.lower), albedo(p.lower + 1), p.fraction);
+    }
+    return sum / static_cast<float>(kSteps);
+}
+
 struct ReflectionTables {
     std::array<std::array<float, kFine>, kFine> albedo{};  // [rough][sqrt mu]
     std::array<float, kFine> average{};
@@ -103,7 +117,8 @@ struct ReflectionTables {
             for (std::size_t m = 0; m < kFine; ++m) {
                 albedo[r][m] = integrate(lattice, view_direction(m, kFine), alpha);
             }
-            average[r] = average_over_directions(r);
+            average[r] =
+                average_over_directions([this, r](std::size_t m) { return albedo[r][m]; }, kFine);
         }
     }
 
@@ -122,19 +137,6 @@ struct ReflectionTables {
         }
         return sum / static_cast<float>(kFineSamples);
     }
-
-    // Integral of 2 mu E dmu with mu = t^2: 4 t^3 E dt, by the midpoint rule on the interpolant.
-    [[nodiscard]] float average_over_directions(std::size_t r) const {
-        constexpr int kSteps = 512;
-        double sum = 0.0;
-        for (int i = 0; i < kSteps; ++i) {
-            const float t = (static_cast<float>(i) + 0.5f) / static_cast<float>(kSteps);
-            const AxisPosition p = axis_position(t, kFine);
-            const float e = lerp(albedo[r][p.lower], albedo[r][p.lower + 1], p.fraction);
-            sum += static_cast<double>(4.0f * t * t * t * e) / kSteps;
-        }
-        return static_cast<float>(sum);
-    }
 };
 
 // Index axis: z with z^2 = |eta - 1| / (eta + 1), once for eta >= 1 and once for its inverse.
@@ -150,6 +152,7 @@ using CoarseRow = std::array<float, kCoarse>;
 struct DielectricTables {
     std::array<Coarse3, 2> glass{};  // [inverse][rough][sqrt mu][z]
     std::array<Coarse3, 2> shape{};
+    std::array<std::array<CoarseRow, kCoarse>, 2> glass_average{};  // [inverse][rough][z]
 
     DielectricTables() {
         const CapLattice<kCoarseSamples> lattice;
@@ -164,6 +167,11 @@ struct DielectricTables {
                     const Vec3 wo = view_direction(m, kCoarse);
                     const VisibleNormals<kCoarseSamples> h(lattice, wo, alpha);
                     integrate(h, {eta, wo.z, alpha}, glass[inverse][r][m], shape[inverse][r][m]);
+                }
+                for (std::size_t k = 0; k < kCoarse; ++k) {
+                    const auto& table = glass[inverse][r];
+                    glass_average[inverse][r][k] = average_over_directions(
+                        [&table, k](std::size_t m) { return table[m][k]; }, kCoarse);
                 }
             }
         }
@@ -228,11 +236,14 @@ struct DielectricTables {
     return tables;
 }
 
+[[nodiscard]] AxisPosition index_position(float eta) {
+    return axis_position(std::sqrt(std::abs(eta - 1.0f) / (eta + 1.0f)), kCoarse);
+}
+
 [[nodiscard]] float interpolate(const Coarse3& table, float mu, float rough, float eta) {
     const AxisPosition r = axis_position(rough, kCoarse);
     const AxisPosition m = axis_position(std::sqrt(saturate(mu)), kCoarse);
-    const float q = std::abs(eta - 1.0f) / (eta + 1.0f);
-    const AxisPosition z = axis_position(std::sqrt(q), kCoarse);
+    const AxisPosition z = index_position(eta);
     std::array<float, 4> corner{};
     for (std::size_t i = 0; i < 4; ++i) {
         const CoarseRow& row = table[r.lower + (i >> 1)][m.lower + (i & 1)];
@@ -263,6 +274,17 @@ float ggx_average_albedo(float rough) {
 
 float ggx_glass_albedo(float mu, float rough, float eta) {
     return interpolate(dielectric_tables().glass[eta < 1.0f ? 1 : 0], mu, rough, eta);
+}
+
+float ggx_glass_average_albedo(float rough, float eta) {
+    const auto& table = dielectric_tables().glass_average[eta < 1.0f ? 1 : 0];
+    const AxisPosition r = axis_position(rough, kCoarse);
+    const AxisPosition z = index_position(eta);
+    const CoarseRow& low = table[r.lower];
+    const CoarseRow& high = table[r.lower + 1];
+    return lerp(lerp(low[z.lower], low[z.lower + 1], z.fraction),
+                lerp(high[z.lower], high[z.lower + 1], z.fraction),
+                r.fraction);
 }
 
 float ggx_dielectric_shape(float mu, float rough, float eta) {

@@ -13,8 +13,9 @@ namespace pharos {
 [[nodiscard]] float ggx_albedo(float mu, float rough);
 [[nodiscard]] float ggx_average_albedo(float rough);
 
-// Reflected plus transmitted albedo of a white glass lobe.
+// Reflected plus transmitted albedo of a white glass lobe, and its mean.
 [[nodiscard]] float ggx_glass_albedo(float mu, float rough, float eta);
+[[nodiscard]] float ggx_glass_average_albedo(float rough, float eta);
 
 // Mean of dielectric_shape() (fresnel.h) over the lobe: albedo = lerp(f0, f90, this) once
 // energy-compensated.

@@ -15,7 +15,8 @@ using namespace setup;
 struct V1 {
     Rgb weight;
     Rgb base;
-    Rgb hue;  // base color over its luminance
+    Rgb specular_hue;  // base color over its luminance, by the weights Blender uses there
+    Rgb sheen_hue;
     Vec3 normal;
     float metallic;
     float transmission;
@@ -24,12 +25,16 @@ struct V1 {
     bool multi;
 };
 
+[[nodiscard]] Rgb hue(const Rgb& color, float lum) {
+    return lum > 0.0f ? color / lum : Rgb(1.0f);
+}
+
 [[nodiscard]] V1 prepare(const PrincipledV1Inputs& in, const ClosureSetupContext& ctx) {
     V1 v{};
     v.weight = safe_color(in.weight);
     v.base = safe_color(in.base_color);
-    const float lum = 0.3f * v.base.x + 0.6f * v.base.y + 0.1f * v.base.z;
-    v.hue = lum > 0.0f ? v.base / lum : Rgb(1.0f);
+    v.specular_hue = hue(v.base, 0.3f * v.base.x + 0.6f * v.base.y + 0.1f * v.base.z);
+    v.sheen_hue = hue(v.base, luminance(v.base));
     v.normal = glossy_normal(in.normal, ctx);
     v.metallic = unit(in.metallic);
     v.transmission = unit(in.transmission);
@@ -61,8 +66,8 @@ void add_diffuse_lobes(const PrincipledV1Inputs& in,
         s.type = ClosureType::Sheen;
         s.smith = 1;
         s.n = v.normal;
-        s.weight =
-            v.weight * (sheen * v.diffuse_share) * lerp(Rgb(1.0f), v.hue, unit(in.sheen_tint));
+        s.weight = v.weight * (sheen * v.diffuse_share) *
+                   lerp(Rgb(1.0f), v.sheen_hue, unit(in.sheen_tint));
         add_closure(s, ctx, sink);
     }
 }
@@ -76,7 +81,7 @@ void add_specular(const PrincipledV1Inputs& in,
     if (!(share > kWeightCutoff) || !(specular > kWeightCutoff || v.metallic > kWeightCutoff)) {
         return;
     }
-    const Rgb tint = lerp(Rgb(1.0f), v.hue, unit(in.specular_tint));
+    const Rgb tint = lerp(Rgb(1.0f), v.specular_hue, unit(in.specular_tint));
     Closure c;
     c.type = ClosureType::GgxReflection;
     c.fresnel = FresnelType::PrincipledV1;
@@ -117,7 +122,7 @@ void add_glass(const PrincipledV1Inputs& in,
         c.weight = v.weight * share;
         c.transmission_tint = v.base;
         make_singular_without_contrast(c);
-        preserve_glass_energy(c, ctx);
+        preserve_glass_energy(c, clamp_color(v.base), ctx);
         add_closure(c, ctx, sink);
         return;
     }

@@ -143,7 +143,7 @@ void add_transmission(const PrincipledV2Inputs& in,
     set_roughness(c, in.roughness);
     make_singular_without_contrast(c);
     if (multi_scatter(in.distribution)) {
-        preserve_glass_energy(c, ctx);
+        preserve_glass_energy(c, c.transmission_tint, ctx);
     }
     add_closure(c, ctx, sink);
 }
