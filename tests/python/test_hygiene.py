@@ -115,3 +115,24 @@ def test_version_is_one():
     info = re.search(r'"version": \((\d+), (\d+), (\d+)\)',
                      (ROOT / "addon/pharos/__init__.py").read_text(encoding="utf-8")).groups()
     assert version == info
+
+
+def test_readme_names_only_what_is_there():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    names = re.findall(r"`((?:native|addon|scenes|tests)/[\w./-]*)`", text)
+    names += re.findall(r"^((?:scenes|tests)/[\w/]+)", text, re.MULTILINE)
+    names += re.findall(r"\]\(([\w./]+)\)", text)
+    missing = sorted({name for name in names if not (ROOT / name).exists()})
+    assert len(names) > 10
+    assert not missing, missing
+
+
+def test_readme_names_only_settings_that_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text.split("| setting (`scene.pharos`)", 1)[1].split("\n\n", 1)[0]
+    properties = (ROOT / "addon/pharos/properties.py").read_text(encoding="utf-8")
+    names = [name for line in table.splitlines()[2:]
+             for name in re.findall(r"`([a-z_]+)`", line.split("|")[1])]
+    missing = [name for name in names if f"    {name}: " not in properties]
+    assert len(names) >= 8
+    assert not missing, missing

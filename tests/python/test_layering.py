@@ -27,7 +27,8 @@ for program in ("bindings", "cli", "bench"):
 
 # A library and the only places that may know it.
 HOMES = {
-    r"<embree\d?/": {"geometry/accelerator.cpp", "bench/accelerator_bench.cpp"},  # a bare loop to compare with
+    # The bench compares with a bare loop over the same rays.
+    r"<embree\d?/": {"geometry/accelerator.cpp", "bench/accelerator_bench.cpp"},
     r"<OpenImageIO/": {"image/image_io.cpp"},
     r"<pybind11/": {"bindings/"},
     r"<hwy/": {"guiding/", "bench/"},
