@@ -11,6 +11,30 @@ namespace {
 
 // A group counts as flat when its normals agree this far.
 constexpr float kFlatCosine = 0.999f;
+// Facing tables look from infinity: they hold from this many bounding radii on.
+constexpr float kFacingDistance = 2.5f;
+
+Vec3 unit_normal(const Vec3& e1, const Vec3& e2) {
+    return normalize_or(glm::cross(glm::normalize(e1), glm::normalize(e2)), Vec3(0.0f));
+}
+
+// Every edge is used once in each direction: a closed, consistently oriented surface.
+bool is_closed(std::span<const UVec3> triangles) {
+    std::vector<std::uint64_t> forward;
+    std::vector<std::uint64_t> backward;
+    for (const UVec3& t : triangles) {
+        for (int c = 0; c < 3; ++c) {
+            const std::uint64_t a = t[c];
+            const std::uint64_t b = t[(c + 1) % 3];
+            forward.push_back((a << 32) | b);
+            backward.push_back((b << 32) | a);
+        }
+    }
+    std::sort(forward.begin(), forward.end());
+    std::sort(backward.begin(), backward.end());
+    return forward == backward &&
+           std::adjacent_find(forward.begin(), forward.end()) == forward.end();
+}
 
 std::uint32_t material_of(const Mesh& mesh, const Instance& instance, std::uint32_t triangle) {
     if (mesh.material_indices.empty() || instance.materials.empty()) {
@@ -26,6 +50,7 @@ EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input) {
     collect(input);
     for (Group& group : groups_) {
         finish_group(group);
+        add_facing_tables(input, group);
     }
     instance_first_.assign(input.instances.size(), kNone);
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
@@ -60,11 +85,9 @@ void EmissiveTriangles::collect(const LightSamplerInput& input) {
         t.e2 = transform_point(instance.to_world, mesh.positions[corner.z]) - t.p0;
         t.instance = emitter.instance;
         t.triangle = emitter.triangle;
-        const float area = 0.5f * glm::length(glm::cross(t.e1, t.e2));
-        const float radiance = average(glm::abs(emitter.L_estimate));
-        // pdf_area holds the weight until the group is complete.
-        t.pdf_area = area * radiance;
-        if (!(t.pdf_area > 0.0f && t.pdf_area < kInfinity && area > 1e-30f)) {
+        t.area = 0.5f * glm::length(glm::cross(t.e1, t.e2));
+        t.weight = t.area * average(glm::abs(emitter.L_estimate));
+        if (!(t.weight > 0.0f && t.weight < kInfinity && t.area > 1e-30f)) {
             continue;
         }
         const std::uint32_t material = material_of(mesh, instance, emitter.triangle);
@@ -88,44 +111,69 @@ void EmissiveTriangles::collect(const LightSamplerInput& input) {
 }
 
 void EmissiveTriangles::finish_group(Group& group) {
-    const std::span<Triangle> members = std::span(triangles_).subspan(group.first, group.count);
     std::vector<float> weights;
-    weights.reserve(members.size());
+    weights.reserve(group.count);
     double area_sum = 0.0;
     double power_sum = 0.0;
-    const Vec3 first_normal = normalize_or(glm::cross(members[0].e1, members[0].e2), Vec3(0.0f));
+    const Vec3 first_normal = unit_normal(triangles_[group.first].e1, triangles_[group.first].e2);
     bool flat = !is_zero(first_normal);
-    for (const Triangle& t : members) {
-        const Vec3 cross = glm::cross(t.e1, t.e2);
-        const float area = 0.5f * glm::length(cross);
-        area_sum += static_cast<double>(area);
-        power_sum += static_cast<double>(t.pdf_area);
-        weights.push_back(t.pdf_area);
+    for (const Triangle& t : members(group)) {
+        area_sum += static_cast<double>(t.area);
+        power_sum += static_cast<double>(t.weight);
+        weights.push_back(t.weight);
         group.bounds.extend(t.p0);
         group.bounds.extend(t.p0 + t.e1);
         group.bounds.extend(t.p0 + t.e2);
-        flat = flat && std::abs(glm::dot(cross, first_normal)) >= kFlatCosine * 2.0f * area;
+        flat = flat && std::abs(glm::dot(unit_normal(t.e1, t.e2), first_normal)) >= kFlatCosine;
     }
     group.area = static_cast<float>(area_sum);
     group.power = static_cast<float>(power_sum);
     group.normal = flat ? first_normal : Vec3(0.0f);
+    group.center = group.bounds.center();
     group.choice = AliasTable(weights);
-    for (std::size_t i = 0; i < members.size(); ++i) {
-        const float area = 0.5f * glm::length(glm::cross(members[i].e1, members[i].e2));
-        members[i].pdf_area = group.choice.pmf(static_cast<std::uint32_t>(i)) / area;
+}
+
+void EmissiveTriangles::add_facing_tables(const LightSamplerInput& input, Group& group) {
+    if (group.count < 4 || group.count > FacingTables::kMaxTriangles) {
+        return;
     }
+    std::vector<UVec3> corners;
+    std::vector<Vec3> normals;
+    std::vector<float> weights;
+    double volume = 0.0;  // six times, signed: its sign says which way is out
+    for (const Triangle& t : members(group)) {
+        const Mesh& mesh = input.meshes[input.instances[t.instance].mesh];
+        corners.push_back(mesh.triangles[t.triangle]);
+        normals.push_back(unit_normal(t.e1, t.e2));
+        weights.push_back(t.weight);
+        volume += static_cast<double>(glm::dot(t.p0 - group.center, glm::cross(t.e1, t.e2)));
+    }
+    if (!is_closed(corners)) {
+        return;
+    }
+    for (Vec3& normal : normals) {
+        normal = volume < 0.0 ? -normal : normal;
+    }
+    group.facing = FacingTables(normals, weights);
+    group.facing_distance2 = sqr(kFacingDistance) * length_squared(0.5f * group.bounds.extent());
+}
+
+const AliasTable& EmissiveTriangles::choice_from(const Group& group, const Vec3& p) const {
+    const Vec3 direction = p - group.center;
+    const bool far = length_squared(direction) > group.facing_distance2;
+    return far ? group.facing.towards(direction) : group.choice;
 }
 
 LightBound EmissiveTriangles::bound(std::uint32_t index) const {
     const Group& group = groups_[index];
     LightBound bound;
-    bound.center = group.bounds.center();
+    bound.center = group.center;
     bound.radius = 0.5f * glm::length(group.bounds.extent());
     bound.area = group.area;
     bound.strength = group.power;
     if (is_zero(group.normal)) {
-        // Seen from anywhere, about half of the area faces away.
-        bound.strength *= 0.5f;
+        // The mean projected area of a sheet is half of it, of a closed surface a quarter.
+        bound.strength *= group.facing.empty() ? 0.5f : 0.25f;
     } else {
         bound.orientation = EmitterOrientation::TwoSided;
         bound.axis = group.normal;
@@ -138,16 +186,17 @@ std::optional<EmissiveTriangles::Sample> EmissiveTriangles::sample(std::uint32_t
                                                                    double u_choice,
                                                                    const Vec2& u) const {
     const Group& group = groups_[group_index];
-    const Triangle& t = triangles_[group.first + group.choice.sample(u_choice).index];
+    const AliasTable::Sample chosen = choice_from(group, p).sample(u_choice);
+    const Triangle& t = triangles_[group.first + chosen.index];
     const Vec2 b = sample_uniform_triangle(u);
     const Vec3 to_light = t.p0 + t.e1 * b.x + t.e2 * b.y - p;
     const float distance2 = length_squared(to_light);
     Sample sample;
     sample.distance = std::sqrt(distance2);
     sample.wi = to_light * (1.0f / sample.distance);
-    const Vec3 cross = glm::cross(t.e1, t.e2);
-    const float cosine = std::abs(glm::dot(sample.wi, cross)) / glm::length(cross);
-    sample.pdf = t.pdf_area * distance2 / cosine;
+    // pmf / area * distance^2 / cosine, with cosine * area = |wi . cross| / 2.
+    const float projected = 0.5f * std::abs(glm::dot(sample.wi, glm::cross(t.e1, t.e2)));
+    sample.pdf = chosen.pmf * distance2 / projected;
     sample.instance = t.instance;
     sample.triangle = t.triangle;
     sample.u = b.x;
@@ -156,16 +205,23 @@ std::optional<EmissiveTriangles::Sample> EmissiveTriangles::sample(std::uint32_t
     return usable ? std::optional(sample) : std::nullopt;
 }
 
-EmissiveTriangles::Entry EmissiveTriangles::find(std::uint32_t instance,
-                                                 std::uint32_t triangle) const {
+std::uint32_t EmissiveTriangles::find(std::uint32_t instance, std::uint32_t triangle) const {
     if (instance >= instance_first_.size() || instance_first_[instance] == kNone) {
-        return {};
+        return kNone;
     }
-    const std::uint32_t slot = slot_[instance_first_[instance] + triangle];
-    if (slot == kNone) {
-        return {};
+    return slot_[instance_first_[instance] + triangle];
+}
+
+float EmissiveTriangles::pdf_area(std::uint32_t instance,
+                                  std::uint32_t triangle,
+                                  const Vec3& p) const {
+    const std::uint32_t index = find(instance, triangle);
+    if (index == kNone) {
+        return 0.0f;
     }
-    return {triangles_[slot].group, triangles_[slot].pdf_area};
+    const Triangle& t = triangles_[index];
+    const Group& group = groups_[t.group];
+    return choice_from(group, p).pmf(index - group.first) / t.area;
 }
 
 }  // namespace pharos

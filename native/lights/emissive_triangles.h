@@ -1,6 +1,7 @@
 // The emissive triangles of a scene in world space, in groups of one instance and material each.
 //
-// Within a group a triangle is chosen in proportion to area times estimated radiance, its point
+// Within a group a triangle is chosen in proportion to area times estimated radiance (closed
+// emitters seen from some distance: times the cosine towards the receiver, too), its point
 // uniformly over the area; densities are converted to solid angle. Both sides emit.
 #pragma once
 
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "lights/facing_tables.h"
 #include "lights/light_sampler.h"
 #include "lights/light_selection.h"
 #include "sampling/alias_table.h"
@@ -43,20 +45,25 @@ class EmissiveTriangles {
                                                double u_choice,
                                                const Vec2& u) const;
 
-    struct Entry {
-        std::uint32_t group = kNone;
-        float pdf_area = 0.0f;  // choice within the group included
-    };
+    // The group that samples a triangle; kNone: not sampled.
+    [[nodiscard]] std::uint32_t find_group(std::uint32_t instance, std::uint32_t triangle) const {
+        const std::uint32_t index = find(instance, triangle);
+        return index == kNone ? kNone : triangles_[index].group;
+    }
 
-    // Group kNone: not sampled.
-    [[nodiscard]] Entry find(std::uint32_t instance, std::uint32_t triangle) const;
+    // Density per area of sampling a point of that triangle from p, choice within the group
+    // included.
+    [[nodiscard]] float pdf_area(std::uint32_t instance,
+                                 std::uint32_t triangle,
+                                 const Vec3& p) const;
 
   private:
     struct Triangle {
         Vec3 p0;
         Vec3 e1;
         Vec3 e2;
-        float pdf_area = 0.0f;
+        float area = 0.0f;
+        float weight = 0.0f;  // area times radiance
         std::uint32_t instance = 0;
         std::uint32_t triangle = 0;
         std::uint32_t group = 0;
@@ -69,11 +76,22 @@ class EmissiveTriangles {
         float area = 0.0f;
         float power = 0.0f;  // radiance times area
         Vec3 normal;         // of a flat group, else zero
+        Vec3 center;
+        float facing_distance2 = kInfinity;  // from which on the facing tables hold
         AliasTable choice;
+        FacingTables facing;  // of a closed group
     };
 
     void collect(const LightSamplerInput& input);
     void finish_group(Group& group);
+    void add_facing_tables(const LightSamplerInput& input, Group& group);
+
+    [[nodiscard]] std::span<const Triangle> members(const Group& group) const {
+        return std::span(triangles_).subspan(group.first, group.count);
+    }
+
+    [[nodiscard]] const AliasTable& choice_from(const Group& group, const Vec3& p) const;
+    [[nodiscard]] std::uint32_t find(std::uint32_t instance, std::uint32_t triangle) const;
 
     std::vector<Triangle> triangles_;
     std::vector<Group> groups_;

@@ -194,13 +194,13 @@ float LightSampler::pdf_triangle(const LightSampleContext& context,
                                  std::uint32_t triangle,
                                  float t,
                                  float cos_light) const {
-    const EmissiveTriangles::Entry entry = impl_->triangles.find(instance, triangle);
+    const std::uint32_t group = impl_->triangles.find_group(instance, triangle);
     const float cosine = std::abs(cos_light);
-    if (entry.group == kNone || !(cosine > 0.0f)) {
+    if (group == kNone || !(cosine > 0.0f)) {
         return 0.0f;
     }
-    const float choice = impl_->selection.pmf(context, impl_->lamp_count() + entry.group);
-    return choice * entry.pdf_area * t * t / cosine;
+    const float choice = impl_->selection.pmf(context, impl_->lamp_count() + group);
+    return choice * impl_->triangles.pdf_area(instance, triangle, context.p) * t * t / cosine;
 }
 
 }  // namespace pharos

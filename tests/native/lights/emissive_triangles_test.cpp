@@ -105,6 +105,37 @@ std::uint32_t add_tetrahedron(TriangleScene& scene) {
                           {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}});
 }
 
+// A sphere of triangles around the origin, radius 1.
+std::uint32_t add_sphere(TriangleScene& scene, unsigned rows, unsigned columns) {
+    std::vector<Vec3> positions = {Vec3(0, 0, 1)};
+    std::vector<UVec3> triangles;
+    for (unsigned y = 1; y < rows; ++y) {
+        for (unsigned x = 0; x < columns; ++x) {
+            const float theta = kPi * static_cast<float>(y) / static_cast<float>(rows);
+            const float phi = 2.0f * kPi * static_cast<float>(x) / static_cast<float>(columns);
+            positions.emplace_back(
+                std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+        }
+    }
+    positions.emplace_back(0, 0, -1);
+    const auto vertex = [&](unsigned y, unsigned x) {
+        return y == 0
+                   ? 0u
+                   : (y == rows ? (rows - 1) * columns + 1 : (y - 1) * columns + x % columns + 1);
+    };
+    for (unsigned y = 0; y < rows; ++y) {
+        for (unsigned x = 0; x < columns; ++x) {
+            if (y > 0) {
+                triangles.emplace_back(vertex(y, x), vertex(y + 1, x), vertex(y, x + 1));
+            }
+            if (y + 1 < rows) {
+                triangles.emplace_back(vertex(y, x + 1), vertex(y + 1, x), vertex(y + 1, x + 1));
+            }
+        }
+    }
+    return scene.add_mesh(std::move(positions), std::move(triangles));
+}
+
 TriangleScene two_quads_and_lamp() {
     TriangleScene scene;
     const std::uint32_t quad = add_quad(scene);
@@ -161,9 +192,11 @@ TEST(EmissiveTriangles, BarycentricsNameThePoint) {
 TEST(EmissiveTriangles, ChanceHitHasTheSamplingDensity) {
     TriangleScene scene = two_quads_and_lamp();
     scene.add_instance(add_tetrahedron(scene), placed(Vec3(2, -1, 2), Vec3(0.3f)), 5.0f);
+    scene.add_instance(
+        add_sphere(scene, 6, 8), placed(Vec3(1, 1, 1), Vec3(0.2f, -0.3f, 0.4f)), 5.0f);
     const LightSampler sampler = scene.sampler();
     Random random(11);
-    std::vector<int> seen(4, 0);
+    std::vector<int> seen(5, 0);
     for (int i = 0; i < 20000; ++i) {
         const LightSampleContext context{random.uniform3() * 0.5f, random.direction(), i % 2 == 0};
         const auto s = sampler.sample(context, random.uniform(), random.uniform2());
@@ -171,7 +204,7 @@ TEST(EmissiveTriangles, ChanceHitHasTheSamplingDensity) {
             continue;
         }
         if (s->instance == kNone) {
-            ++seen[3];
+            ++seen[4];
             const auto hit = sampler.intersect_lamps({context.p, s->sample.wi}, &context);
             ASSERT_TRUE(hit);
             EXPECT_NEAR(hit->pdf / s->sample.pdf, 1.0f, 1e-3f);
@@ -227,6 +260,48 @@ TEST(EmissiveTriangles, ChiSquare) {
         options);
     EXPECT_TRUE(result.passed) << result.message;
     EXPECT_NEAR(result.total_mass, 1.0, 3e-3);
+}
+
+// A closed emitter is sampled where it faces the receiver: low variance, right mean; with one
+// triangle missing (an open surface) both sides are sampled alike.
+TEST(EmissiveTriangles, ClosedEmittersAreSampledWhereTheyFace) {
+    for (const bool inside_out : {false, true}) {
+        TriangleScene scene;
+        const std::uint32_t mesh = add_sphere(scene, 10, 16);
+        scene.add_instance(
+            mesh, placed(Vec3(0.5f, 0, 2), Vec3(inside_out ? -0.1f : 0.1f, 0.1f, 0.1f)), 1.0f);
+        const auto spread_of = [&](double& mean) {
+            const LightSampler sampler = scene.sampler();
+            Random random(3);
+            double sum = 0.0;
+            double sum2 = 0.0;
+            constexpr int kSamples = 20000;
+            for (int i = 0; i < kSamples; ++i) {
+                const auto s =
+                    sampler.sample(test::plane_point(), random.uniform(), random.uniform2());
+                const auto nearest = scene.trace(Vec3(0.0f), s->sample.wi);
+                if (nearest.triangle != s->triangle) {
+                    continue;  // occluded by its own front
+                }
+                const auto value = static_cast<double>(s->sample.wi.z / s->sample.pdf);
+                sum += value;
+                sum2 += value * value;
+            }
+            mean = sum / kSamples;
+            return sum2 / kSamples / mean / mean - 1.0;
+        };
+        double closed_mean = 0.0;
+        double open_mean = 0.0;
+        const double closed = spread_of(closed_mean);
+        scene.emitters.pop_back();
+        const double open = spread_of(open_mean);
+        EXPECT_LT(closed, 0.35);
+        EXPECT_GT(open, 1.3);
+        EXPECT_NEAR(closed_mean / open_mean, 1.0, 0.04);
+        // pi (r / d)^2 cos of a sphere, slightly less for its triangles.
+        const double expected = std::numbers::pi * 0.01 / 4.25 * (2.0 / std::sqrt(4.25));
+        EXPECT_NEAR(closed_mean / expected, 0.97, 0.02);
+    }
 }
 
 // Triangles are chosen in proportion to area times radiance, without a bias in huge groups.
