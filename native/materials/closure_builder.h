@@ -43,6 +43,9 @@ inline constexpr float kWeightCutoff = 1e-5f;
 [[nodiscard]] Vec3 glossy_normal(const Vec3& n, const ClosureSetupContext& ctx);
 [[nodiscard]] Vec3 diffuse_normal(const Vec3& n, const ClosureSetupContext& ctx);
 
+// Lets a diffuse closure know that its normal is bumped (lobes/diffuse.h).
+void set_bump_terminator(Closure& c, const ClosureSetupContext& ctx);
+
 // Unit vector across n towards `direction`; zero where that is (nearly) along n.
 [[nodiscard]] Vec3 tangent_around(const Vec3& n, const Vec3& direction);
 

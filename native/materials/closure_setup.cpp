@@ -78,6 +78,16 @@ Vec3 diffuse_normal(const Vec3& n, const ClosureSetupContext& ctx) {
     return ctx.blender_version < 306 ? glossy_normal(n, ctx) : normalize_or(n, ctx.ns);
 }
 
+void set_bump_terminator(Closure& c, const ClosureSetupContext& ctx) {
+    if (c.n == ctx.ns) {
+        return;
+    }
+    c.tangent = ctx.ns;
+    c.smith = ctx.blender_version >= 405 ? kBumpMasking : kBumpPolynomial;
+    const float cosine = std::max(std::abs(glm::dot(c.n, ctx.ns)), 1e-3f);
+    c.alpha_x = saturate(0.125f * (1.0f / (cosine * cosine) - 1.0f));
+}
+
 Vec3 tangent_around(const Vec3& n, const Vec3& direction) {
     const Vec3 d = normalize_or(direction, Vec3(0.0f));
     const Vec3 once = d - n * glm::dot(d, n);
@@ -159,6 +169,7 @@ void add_diffuse(const DiffuseInputs& in, const ClosureSetupContext& ctx, Closur
     c.type = ClosureType::Diffuse;
     c.weight = in.weight;
     c.n = in.normal;
+    set_bump_terminator(c, ctx);
     const float sigma = unit(in.roughness);
     if (sigma > 1e-5f) {
         c.type = ClosureType::OrenNayar;
@@ -267,7 +278,9 @@ void setup_translucent(const ScatterInputs& in, const ClosureSetupContext& ctx, 
     Closure c;
     c.type = ClosureType::Translucent;
     c.weight = node_weight(in);
-    c.n = diffuse_normal(in.normal, ctx);
+    // Translucent keeps the reflection fix in every version.
+    c.n = glossy_normal(in.normal, ctx);
+    set_bump_terminator(c, ctx);
     add_closure(c, ctx, sink);
 }
 

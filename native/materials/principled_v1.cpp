@@ -55,6 +55,7 @@ void add_diffuse_lobes(const PrincipledV1Inputs& in,
     Closure c;
     c.type = ClosureType::DisneyDiffuse;
     c.n = v.normal;
+    set_bump_terminator(c, ctx);
     c.parameter = v.roughness;
     c.weight = v.weight * v.diffuse_share *
                lerp(v.base, safe_color(in.subsurface_color), unit(in.subsurface));

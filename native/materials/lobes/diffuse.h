@@ -5,6 +5,9 @@
 //               of Portsmouth, Kutz, Hill 2024 (EON) is folded into Closure::f0 for wo:
 //               f cos = weight nl (a + b t + f0 (1 - E(nl)))
 //   Disney      Burley 2015, base diffuse times Fresnel plus retro-reflection (cycles-parity 2.8)
+//   Bump        where the closure's normal is not the interpolated one, a factor softens the
+//               terminator (cycles-parity 2.5). Set-up then stores the interpolated normal in
+//               Closure::tangent, the kind in Closure::smith and its alpha^2 in Closure::alpha_x.
 #pragma once
 
 #include "core/math.h"
@@ -12,14 +15,37 @@
 
 namespace pharos {
 
+inline constexpr std::uint8_t kBumpPolynomial = 1;  // Blender up to 4.4
+inline constexpr std::uint8_t kBumpMasking = 2;     // 4.5
+
+// Factor on f of a closure with a bumped normal; 1 for others (Closure::smith = 0).
+[[nodiscard]] inline float bump_terminator(const Closure& c, const Vec3& wi) {
+    const float smooth = glm::dot(c.tangent, wi);
+    const float bumped = glm::dot(c.n, wi);
+    if (!(smooth * bumped > 0.0f)) {
+        return 0.0f;
+    }
+    if (c.smith == kBumpMasking) {
+        // Smith masking by a surface as rough as the two normals differ.
+        const float z = std::abs(smooth);
+        return 2.0f * z / (z + std::sqrt(z * z + c.alpha_x * std::max(1.0f - z * z, 0.0f)));
+    }
+    const float g = smooth / (bumped * std::max(glm::dot(c.n, c.tangent), 1e-6f));
+    return g >= 1.0f ? 1.0f : g + g * g - g * g * g;
+}
+
+[[nodiscard]] inline float bump_factor(const Closure& c, const Vec3& wi) {
+    return c.smith == 0 ? 1.0f : bump_terminator(c, wi);
+}
+
 [[nodiscard]] inline BsdfEval eval_lambert(const Closure& c, const Vec3& wi) {
     const float pdf = std::max(glm::dot(c.n, wi), 0.0f) * kInvPi;
-    return {c.weight * pdf, pdf};
+    return {c.weight * (pdf * bump_factor(c, wi)), pdf};
 }
 
 [[nodiscard]] inline BsdfEval eval_translucent(const Closure& c, const Vec3& wi) {
     const float pdf = std::max(-glm::dot(c.n, wi), 0.0f) * kInvPi;
-    return {c.weight * pdf, pdf};
+    return {c.weight * (pdf * bump_factor(c, wi)), pdf};
 }
 
 // a and b of f = a + b t.
@@ -63,7 +89,7 @@ struct OrenNayarTerms {
     if (!is_zero(c.f0)) {
         f += c.f0 * std::max(1.0f - oren_nayar_albedo(terms, nl), 0.0f);
     }
-    return {c.weight * f * nl, nl * kInvPi};
+    return {c.weight * f * (nl * bump_factor(c, wi)), nl * kInvPi};
 }
 
 [[nodiscard]] inline float schlick_weight(float cosine) {
@@ -85,7 +111,7 @@ struct OrenNayarTerms {
     const float base = (1.0f - 0.5f * fl) * (1.0f - 0.5f * fv);
     const float retro = rr * (fl + fv + fl * fv * (rr - 1.0f));
     const float pdf = nl * kInvPi;
-    return {c.weight * (std::max(base + retro, 0.0f) * pdf), pdf};
+    return {c.weight * (std::max(base + retro, 0.0f) * pdf * bump_factor(c, wi)), pdf};
 }
 
 }  // namespace pharos
