@@ -9,8 +9,9 @@ namespace pharos {
 
 enum class CameraType : std::uint32_t { Perspective, Orthographic };
 
-// The image plane window: at distance 1 for a perspective camera, in metres for an orthographic one.
-// Pixel (x, y), origin bottom left, looks through lower + (x/width, y/height) * (upper - lower).
+// The image plane window: at distance 1 for a perspective camera, in metres for an orthographic
+// one. Pixel (x, y), origin bottom left, looks through lower + (x/width, y/height) * (upper -
+// lower).
 struct CameraDescription {
     CameraType type = CameraType::Perspective;
     Mat4 to_world{1.0f};  // looks along local -Z, +Y up; no scale

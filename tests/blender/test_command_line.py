@@ -36,8 +36,19 @@ def make_scene(name: str, samples: int, kind: str = "plain") -> Path:
     script = FOLDER / "make.py"
     script.write_text(_SCENE, encoding="utf-8")
     subprocess.run(
-        [BLENDER, "-b", "--factory-startup", "--python-exit-code", "3", "--python", str(script)]
-        + ["--", str(path), kind, str(samples)],
+        [
+            BLENDER,
+            "-b",
+            "--factory-startup",
+            "--python-exit-code",
+            "3",
+            "--python",
+            str(script),
+            "--",
+            str(path),
+            kind,
+            str(samples),
+        ],
         check=True,
         capture_output=True,
         timeout=120,

@@ -121,9 +121,10 @@ struct Problem {
         }
         const auto pdf = static_cast<double>(raw[i].pdf);
         const double field = m.integral * m.pdf(raw[i].wi);
-        const double slope = 2.0 * field * (field - y * pdf) /
+        const double slope = 0.25 * M_1_PI * 2.0 * field * (field - y * pdf) /
                              (pdf * (field * field + static_cast<double>(kFieldEpsilon)));
-        return {w * std::clamp(slope, -20.0, 20.0), w * std::clamp(slope, -20.0, 20.0)};
+        const auto clip = static_cast<double>(layout.config.weight_clip);
+        return {w * std::clamp(slope, -clip, clip), w * std::clamp(slope, -clip, clip)};
     }
 
     // The function whose gradient the kernels give.

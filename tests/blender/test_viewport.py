@@ -1,0 +1,276 @@
+"""The rendered viewport in a real window: exact colours, upright, edits, resizes, no crash.
+
+Steps run from a timer, one at a time, so that Blender draws between them; screenshots are of the
+whole window and cut here (only those show what an engine draws).
+"""
+# hosts: window
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import traceback
+
+import bpy
+import harness
+import numpy as np
+
+SHOT = harness.TEMPORARY / "shot.png"
+
+
+def area():
+    screen = bpy.context.window_manager.windows[0].screen
+    return next(a for a in screen.areas if a.type == "VIEW_3D")
+
+
+def window_region():
+    return next(r for r in area().regions if r.type == "WINDOW")
+
+
+def shade(kind: str) -> None:
+    area().spaces[0].shading.type = kind
+
+
+def screenshot() -> np.ndarray:
+    """Bytes of the viewport's window region, bottom row first."""
+    window = bpy.context.window_manager.windows[0]
+    region = window_region()
+    with bpy.context.temp_override(window=window, area=area(), region=region):
+        bpy.ops.screen.screenshot(filepath=str(SHOT))
+    # An image in Blender's own data would be an edit, and start the viewport anew.
+    done = subprocess.run(
+        ["convert", str(SHOT), "-depth", "8", "rgb:-"], capture_output=True, check=True
+    )
+    shot = np.frombuffer(done.stdout, np.uint8).reshape(window.height, window.width, 3)[::-1]
+    cut = shot[region.y : region.y + region.height, region.x : region.x + region.width]
+    return cut.astype(np.float64)
+
+
+def encoded(linear) -> np.ndarray:
+    """What the Standard view shows of scene-linear values, in bytes."""
+    v = np.asarray(linear, float)
+    return 255 * np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.power(v, 1 / 2.4) - 0.055)
+
+
+def expect(shot, fractions, linear) -> None:
+    """The colour at a place (fractions of width and height, from the bottom left)."""
+    x, y = (int(f * n) for f, n in zip(fractions, (shot.shape[1], shot.shape[0])))
+    seen = shot[y, x]
+    assert np.abs(seen - encoded(linear)).max() <= 2.5, (fractions, seen, encoded(linear))
+
+
+def view_state() -> tuple:
+    data = area().spaces[0].region_3d
+    return data, data.view_rotation.copy()
+
+
+def step_prepare():
+    scene = harness.new_scene(64, 64, 16)
+    scene.pharos.preview_samples = 32
+    scene.view_settings.view_transform = "Standard"
+    scene.world.color = (0.2, 0.5, 0.1)
+    space = area().spaces[0]
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.show_region_toolbar = space.show_region_ui = space.show_region_header = False
+    shade("RENDERED")
+
+
+def step_colour_is_exact():
+    shot = screenshot()
+    for place in ((0.1, 0.1), (0.5, 0.5), (0.9, 0.8)):
+        expect(shot, place, (0.2, 0.5, 0.1))
+
+
+def step_upright_scene():
+    camera = harness.add_camera(type="ORTHO", ortho_scale=2.0)
+    camera.data.sensor_fit = "VERTICAL"
+    upper = [(-9, 0, 0), (9, 0, 0), (9, 9, 0), (-9, 9, 0)]
+    left = [(-9, -9, 0), (0, -9, 0), (0, 0, 0), (-9, 0, 0)]
+    face = [(0, 1, 2, 3)]
+    red = harness.emission((0.8, 0.0, 0.0), name="Red")
+    harness.add_object(harness.make_mesh("Upper", upper, face), red)
+    harness.add_object(
+        harness.make_mesh("Left", left, face), harness.emission((0.0, 0.0, 0.7), name="Blue")
+    )
+    area().spaces[0].region_3d.view_perspective = "CAMERA"
+
+
+def step_upright():
+    shot = screenshot()
+    expect(shot, (0.5, 0.6), (0.8, 0.0, 0.0))
+    expect(shot, (0.45, 0.4), (0.0, 0.0, 0.7))
+    expect(shot, (0.55, 0.4), (0.2, 0.5, 0.1))
+
+
+def step_edit_material():
+    tree = bpy.data.materials["Red"].node_tree
+    emitter = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    emitter.inputs["Color"].default_value = (0.0, 0.9, 0.9, 1.0)
+
+
+def step_material_edit_shows():
+    expect(screenshot(), (0.5, 0.6), (0.0, 0.9, 0.9))
+
+
+def step_move_object():
+    bpy.data.objects["Upper"].location.y += 20.0
+
+
+def step_move_shows():
+    expect(screenshot(), (0.5, 0.6), (0.2, 0.5, 0.1))
+
+
+def step_delete_and_undo():
+    bpy.data.objects.remove(bpy.data.objects["Left"])
+
+
+def step_delete_shows():
+    expect(screenshot(), (0.45, 0.4), (0.2, 0.5, 0.1))
+
+
+def step_navigate():
+    data = area().spaces[0].region_3d
+    data.view_perspective = "PERSP"
+    for _ in range(10):
+        data.view_rotation.rotate(__import__("mathutils").Euler((0.0, 0.1, 0.3)))
+        data.view_distance *= 1.05
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
+def step_resize():
+    space = area().spaces[0]
+    for flag in (True, False, True, False):
+        space.show_region_ui = space.show_region_toolbar = flag
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
+
+
+def step_after_resize():
+    shot = screenshot()
+    assert shot.shape[0] > 100 and shot.shape[1] > 100
+    expect(shot, (0.02, 0.02), (0.2, 0.5, 0.1))
+
+
+def step_split_area():
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.4)
+
+
+def step_close_area():
+    views = [a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D"]
+    for view in views:
+        view.spaces[0].shading.type = "RENDERED"
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
+    if len(views) > 1:
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window, area=views[-1]):
+            bpy.ops.screen.area_close()
+
+
+def step_toggle_shading():
+    for _ in range(15):
+        for kind in ("SOLID", "RENDERED"):
+            shade(kind)
+            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
+def step_switch_engine():
+    render = bpy.context.scene.render
+    for engine in ("BLENDER_WORKBENCH", "PHAROS", "CYCLES", "PHAROS"):
+        render.engine = engine
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
+
+
+def step_still_right():
+    expect(screenshot(), (0.02, 0.02), (0.2, 0.5, 0.1))
+
+
+def step_render_beside():
+    harness.add_camera()
+    bpy.context.scene.pharos.samples = 1 << 20
+    bpy.context.preferences.view.render_display_type = "NONE"
+    assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+
+
+def step_cancel_render():
+    """Esc as a user presses it."""
+    assert bpy.app.is_job_running("RENDER"), "the render is not under way"
+    os.system("xdotool key Escape")
+    _state["cancelled"] = time.monotonic()
+
+
+def step_render_has_stopped():
+    assert not bpy.app.is_job_running("RENDER"), "Esc did not stop the render"
+    harness.say(f"MEASURED Esc to end: under {time.monotonic() - _state['cancelled']:.2f} s")
+
+
+def step_report_arrives():
+    bpy.context.scene.camera.data.type = "PANO"
+    bpy.data.objects["Camera"].data.update_tag()
+    harness.add_object(harness.plane_mesh("Strange"), harness.material("Empty"))
+    harness.link(bpy.data.objects.new("Fog", bpy.data.volumes.new("Fog")))
+
+
+def step_report_is_there():
+    assert any("Fog" in line for line in harness.report()), harness.report()
+
+
+def step_load_file():
+    path = harness.TEMPORARY / "viewport.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def step_after_load():
+    assert bpy.context.scene.render.engine == "PHAROS"
+    shade("RENDERED")
+
+
+def step_new_file():
+    bpy.ops.wm.read_homefile(use_factory_startup=False)
+
+
+STEPS = [function for name, function in globals().items() if name.startswith("step_")]
+_INTERVAL = 0.4
+_MOST_TRIES = 75
+_state = {"tries": 0}
+
+
+def fail(function, error) -> None:
+    traceback.print_exc()
+    harness.say(f"FAIL {function.__name__}: {type(error).__name__}: {error}")
+    finish(1)
+
+
+def finish(code: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def run_next() -> float:
+    """One step, again and again while what it expects has not come yet; a failure ends the process,
+    as an exception in a timer would leave it running."""
+    if not STEPS:
+        finish(0)
+    function = STEPS[0]
+    try:
+        function()
+    except AssertionError as error:
+        _state["tries"] += 1
+        if _state["tries"] < _MOST_TRIES:
+            return _INTERVAL
+        fail(function, error)
+    except BaseException as error:
+        fail(function, error)
+    harness.say(f"PASS {function.__name__}")
+    _state["tries"] = 0
+    STEPS.pop(0)
+    return _INTERVAL
+
+
+harness.enable_addon()
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(run_next, first_interval=1.0, persistent=True)
