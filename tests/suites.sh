@@ -129,7 +129,7 @@ suite_tidy() {
 STATISTICAL='ChiSquare|chi_square|Statistic|Random.*Bound|Long'
 
 suite_asan() {
-    build_or_fail asan all || return
+    build_or_fail asan native_tests || return
     ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1 \
         LSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/leaks.txt:print_suppressions=0 \
         UBSAN_OPTIONS=print_stacktrace=1 \
