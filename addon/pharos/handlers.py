@@ -1,5 +1,5 @@
-"""What happens outside of a render: reports reach their scenes, a dump asked for on the command line
-is written once the file is loaded.
+"""What happens outside of a render: reports reach their scenes, a dump asked for by an argument is
+written once the file is loaded.
 
 Renders may run on threads that must not write to Blender's data, so their reports wait here for a
 timer on the main thread; in background mode there is no other thread and they are written at once.

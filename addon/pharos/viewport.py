@@ -6,6 +6,7 @@ a timer on the main thread looks for new pictures and asks for a redraw.
 
 from __future__ import annotations
 
+import time
 import weakref
 
 import bpy
@@ -18,7 +19,9 @@ from .export.scene import export_scene, set_view
 from .export.settings import viewport_samples
 from .final import stats_line
 
-_TIMER_INTERVAL = 1.0 / 30.0
+_SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
+_LONGEST_INTERVAL = 0.5
+_DRAWING_SHARE = 0.25  # most of the time may go into rendering, not into showing it
 
 
 class ViewState:
@@ -78,6 +81,7 @@ class Viewport:
         self._picture = None
         self._texture = None
         self._report = Report()
+        self._interval = _SHORTEST_INTERVAL
         self._start_timer()
 
     def close(self) -> None:
@@ -95,6 +99,7 @@ class Viewport:
         return self._session is not None and self._session.progress().serial != self._drawn_serial
 
     def draw(self, engine, context, depsgraph) -> None:
+        began = time.monotonic()
         if self._description is None:
             self.scene_changed(depsgraph)
         state = ViewState(self._native, context)
@@ -105,6 +110,8 @@ class Viewport:
         progress = self._session.progress()
         failed = progress.state == self._native.SessionState.Failed
         engine.update_stats("", progress.error if failed else stats_line(progress))
+        wished = (time.monotonic() - began) / _DRAWING_SHARE
+        self._interval = min(max(wished, _SHORTEST_INTERVAL), _LONGEST_INTERVAL)
 
     def _restart(self, state: ViewState, depsgraph) -> None:
         self._session = None  # its threads have ended when this returns
@@ -157,9 +164,9 @@ class Viewport:
                 return None
             if viewport.has_news():
                 redraw_viewports()
-            return _TIMER_INTERVAL
+            return viewport._interval
 
-        bpy.app.timers.register(look, first_interval=_TIMER_INTERVAL)
+        bpy.app.timers.register(look, first_interval=_SHORTEST_INTERVAL)
 
 
 def redraw_viewports() -> None:

@@ -1,7 +1,7 @@
 """Builds node programs: registers, constants, operations. Knows neither Blender nor node trees.
 
-A Value is where a number lives: a constant (then its components are known here, and operations on it
-may be done at once), a register, or the node's own default.
+A Value is where a number lives: a constant (then its components are known here, and operations on
+it may be done at once), a register, or the node's own default.
 """
 
 from __future__ import annotations
