@@ -147,6 +147,13 @@ PHAROS_SIMD_INLINE LobeDensities lobe_densities(const Decoded& mixture, int lobe
     return out;
 }
 
+struct RecordVector {
+    V wi[3];
+    V target;
+    V pdf;
+    V weight;
+};
+
 // What multiplies d log pdf and d log A in a record's gradient, and the loss itself.
 struct LossTerms {
     V log_pdf;
@@ -172,17 +179,20 @@ PHAROS_SIMD_INLINE LossTerms kl_terms(const GuidingConfig& config,
     return {-w, weight * slope, loss};
 }
 
-// The slides' loss: (A pdf - L)^2 / (A pdf)^2, denominator held, importance weighted by 1 / p.
-PHAROS_SIMD_INLINE LossTerms relative_squared_terms(
-    const V& integral, const V& density, const V& target, const V& pdf, const V& weight) {
+// The slides' loss: (A pdf - L)^2 / (A pdf)^2, denominator held, as its mean over the sphere
+// (importance weighted by 1 / (4 pi p)), so that its clip means the same as that of the KL weight.
+PHAROS_SIMD_INLINE LossTerms relative_squared_terms(const V& integral,
+                                                    const V& density,
+                                                    const RecordVector& record,
+                                                    float clip) {
     const V field = integral * density;
-    const V radiance = target * pdf;
-    const V inverse = 1.0f / (pdf * (field * field + kFieldEpsilon));
+    const V radiance = record.target * record.pdf;
+    const V inverse = 0.0795774715f / (record.pdf * (field * field + kFieldEpsilon));
     const V difference = field - radiance;
-    const V limit = simd::broadcast<V>(kGradientLimit);
+    const V limit = simd::broadcast<V>(clip);
     const V slope = simd::min(simd::max(2.0f * field * difference * inverse, -limit), limit);
     const V loss = simd::min(difference * difference * inverse, simd::broadcast<V>(1e6f));
-    return {weight * slope, weight * slope, weight * loss};
+    return {record.weight * slope, record.weight * slope, record.weight * loss};
 }
 
 // Gradients too small to matter become zero before they turn into denormals, which cost a hundred
@@ -190,15 +200,6 @@ PHAROS_SIMD_INLINE LossTerms relative_squared_terms(
 [[gnu::always_inline]] inline void store_gradient(float* p, const V& g) {
     store(p, simd::select(simd::abs(g) < 1e-18f, V{}, g));
 }
-
-// Gradient of one vector of records into the last layer's rows (which hold the raw outputs on
-// entry).
-struct RecordVector {
-    V wi[3];
-    V target;
-    V pdf;
-    V weight;
-};
 
 [[gnu::always_inline]] inline void store_lobe_gradient(const Decoded& mixture,
                                                        const LobeDensities& densities,
@@ -231,6 +232,8 @@ struct RecordVector {
     }
 }
 
+// Gradient of one vector of records into the last layer's rows, which hold the raw outputs on
+// entry. Returns the losses.
 inline V record_gradient(const GuidingConfig& config,
                          const RecordVector& record,
                          float inverse_batch,
@@ -243,8 +246,7 @@ inline V record_gradient(const GuidingConfig& config,
     const LossTerms terms =
         config.loss == GuidingLoss::KullbackLeibler
             ? kl_terms(config, mixture.integral, densities.sum, record.target, record.weight)
-            : relative_squared_terms(
-                  mixture.integral, densities.sum, record.target, record.pdf, record.weight);
+            : relative_squared_terms(mixture.integral, densities.sum, record, config.weight_clip);
     const V share_scale = terms.log_pdf * inverse_batch / (densities.sum + kDensityFloor);
     const V density_share = densities.sum * share_scale;
     for (int k = 0; k < lobes; ++k) {

@@ -19,8 +19,9 @@ inline constexpr float kDensityFloor = 1e-8f;  // added to the density inside th
 inline constexpr float kIntegralEpsilon =
     1e-3f;  // added to A in denominators; A is in units of the scale
 inline constexpr float kGradientLimit = 20.0f;  // of one record, where the loss is quadratic
-// In the denominator of the relative squared loss; 1e-2 of the squared mean radiance (1 / 4 pi)
-inline constexpr float kFieldEpsilon = 6.33e-5f;
+// The slides' constant in the denominator of the relative squared loss, of a field whose integral
+// is about 1: with it the dim background counts as plain squared error and the lobe finds the peak.
+inline constexpr float kFieldEpsilon = 1e-2f;
 
 // One set of weights and how the scene's positions become inputs.
 struct NetworkView {

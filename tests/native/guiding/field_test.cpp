@@ -312,7 +312,7 @@ TEST(Field, AttacksLeaveItFinite) {
             for (std::uint64_t pass = 0; pass < 3; ++pass) {
                 field.train(record_pass(field, two_lights, 4096, 50 + pass), pool);
             }
-            EXPECT_GT(field.generation(), generation);
+            EXPECT_GT(field.generation(), generation) << "attack " << (&attack - attacks.data());
             expect_valid(field);
         }
     }
