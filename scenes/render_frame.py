@@ -34,8 +34,9 @@ def main():
     if frame:
         scene.frame_set(int(frame))
     if samples:
-        scene.pharos.follow_cycles = False
-        scene.pharos.samples = int(samples)
+        for settings in (scene.pharos, getattr(scene, "cycles", None)):
+            if settings is not None:
+                settings.samples = int(samples)
     Path(view_file).write_text(describe_view(scene), encoding="utf-8")
     bpy.ops.render.render()
     save(scene, out + ".exr", "OPEN_EXR", "32")

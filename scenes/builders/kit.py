@@ -36,10 +36,18 @@ def finish(path):
     _set_cycles(scene.cycles)
     if hasattr(scene, "pharos"):
         render.engine = "PHAROS"
-        scene.pharos.samples = SAMPLES
+        _set_pharos(scene.pharos)
     else:
         render.engine = "CYCLES"
     bpy.ops.wm.save_as_mainfile(filepath=path, compress=True, relative_remap=False)
+
+
+def _set_pharos(pharos):
+    pharos.samples = SAMPLES
+    pharos.pixel_filter, pharos.filter_width = "BOX", 1.0
+    pharos.max_bounces = BOUNCES
+    for kind in ("diffuse", "glossy", "transmission", "transparent"):
+        setattr(pharos, f"{kind}_bounces", BOUNCES)
 
 
 def _set_cycles(cycles):

@@ -25,7 +25,6 @@ def main():
     settings.use_nee = True
     settings.time_limit = 0.0
     settings.pixel_filter, settings.filter_width = "BOX", 1.0
-    settings.clamp_direct = settings.clamp_indirect = 0.0
     settings.caustics_reflective = settings.caustics_refractive = True
     settings.max_bounces = int(bounces)
     for kind in ("diffuse", "glossy", "transmission", "transparent"):
