@@ -44,6 +44,7 @@ class Compiler {
                                       std::uint32_t size,
                                       std::int32_t& resolved);
     [[nodiscard]] std::int32_t gather(std::span<const Source> parts);
+    void name_tangent_map(NodeOp& op, std::vector<std::int32_t>& operands) const;
     void emit_value(NodeOp op, const OpShape& shape, std::int32_t first_target);
     void fold(NodeOp op, const OpShape& shape, std::int32_t first_target);
     void emit_closure(const NodeOp& op);
@@ -118,6 +119,9 @@ std::string Compiler::compile_op(const NodeOp& op) {
         }
         constant = constant && operands[k] < 0;
     }
+    if (op.code == NodeOpCode::NormalMap) {
+        name_tangent_map(compiled, operands);
+    }
     compiled.first_operand = static_cast<std::uint32_t>(out_.operands.size());
     out_.operands.insert(out_.operands.end(), operands.begin(), operands.end());
     if (shape.kind == OpKind::Closure) {
@@ -182,6 +186,21 @@ std::int32_t Compiler::gather(std::span<const Source> parts) {
         values_.push_back(copy);
     }
     return first;
+}
+
+// A tangent needs the map, not one point's coordinates: the uv operand becomes its name's index.
+void Compiler::name_tangent_map(NodeOp& op, std::vector<std::int32_t>& operands) const {
+    op.mode &= 3;
+    if (operands.size() < 3) {
+        return;
+    }
+    for (const NodeOp& value : values_) {
+        if (value.code == NodeOpCode::Uv && value.output == operands[2] && value.mode < 0x3fff) {
+            op.mode = static_cast<std::uint16_t>(op.mode | (value.mode + 1) << 2);
+        }
+    }
+    operands.resize(2);
+    op.operand_count = 2;
 }
 
 void Compiler::emit_value(NodeOp op, const OpShape& shape, std::int32_t first_target) {

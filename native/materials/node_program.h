@@ -46,8 +46,8 @@ enum class NodeOpCode : std::uint16_t {
     Combine = 15,      // x:1 y:1 z:1 -> 3 (separating: name the component's register or constant)
     Fresnel = 16,      // ior:1 normal:3 -> 1
     LayerWeight = 17,  // blend:1 normal:3; -> 2 (fresnel, facing)
-    NormalMap = 18,   // strength:1 color:3; mode = NormalMapSpace | (name index + 1) << 2 of the uv
-                      // map that gives the tangent (0 there: the first) -> 3
+    NormalMap = 18,  // strength:1 color:3 (| uv:3, an output of Uv: its map gives the tangent, else
+                     // the first map does); mode = NormalMapSpace -> 3
     ObjectInfo = 19,  // mode = ObjectInfoOutput -> 1 or 3
     CameraData = 20,  // mode = CameraDataOutput -> 1 or 3
     LightPath = 21,   // mode = LightPathOutput -> 1

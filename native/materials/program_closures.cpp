@@ -259,11 +259,16 @@ class ClosureWriter {
         used_ += sink.count();
     }
 
-    // The closure written last, again, with another normal.
-    void repeat_last(std::size_t lane, const Vec3& normal) {
+    // The Lambert closure written last, again, with another normal.
+    void repeat_last(std::size_t lane, const Vec3& normal, const ClosureSetupContext& ctx) {
         const std::size_t slot = e_.hit_index(lane);
-        out_.closures[used_] = out_.closures[used_ - 1];
-        out_.closures[used_].n = normal;
+        const Closure& last = out_.closures[used_ - 1];
+        Closure& c = out_.closures[used_];
+        c.weight = last.weight;
+        c.sample_weight = last.sample_weight;
+        c.type = last.type;
+        c.n = normal;
+        setup::set_bump_terminator(c, ctx);
         out_.first[slot] = static_cast<std::uint32_t>(used_++);
         out_.count[slot] = 1;
         out_.emission[slot] = Rgb(0.0f);
@@ -355,8 +360,9 @@ void run_scatter(const Evaluation& e, const NodeOp& op, ClosureWriter& writer) {
         if (lane > 0 && op.code == NodeOpCode::Diffuse && source.constant() &&
             writer.last_is_lambert()) {
             const SurfaceInteraction& hit = e.hit(lane);
-            writer.repeat_last(
-                lane, setup::diffuse_normal(source.at(lane, hit.ns).normal, context_of(e, hit)));
+            const ClosureSetupContext ctx = context_of(e, hit);
+            const Vec3 normal = setup::diffuse_normal(source.at(lane, hit.ns).normal, ctx);
+            writer.repeat_last(lane, normal, ctx);
             continue;
         }
         writer.write_hit(lane, [&](const auto&, ClosureSetupContext& ctx, ClosureSink& sink) {

@@ -161,6 +161,10 @@ bool find_shape(const NodeProgram& program, const NodeOp& op, OpShape& shape) {
             shape.size[shape.operand_count++] = static_cast<std::uint8_t>(c - '0');
         }
     }
+    // A normal map may name its uv map by an operand, too: compiling turns it into a mode.
+    if (op.code == NodeOpCode::NormalMap && op.operand_count == 3) {
+        shape.size[shape.operand_count++] = 3;
+    }
     return shape.operand_count == op.operand_count;
 }
 

@@ -127,6 +127,9 @@ TEST(ProgramCompile, ConstantDiffuseHasOneClosureAHit) {
 TEST(ProgramCompile, BatchesEqualSingleHits) {
     std::vector<Material> materials = {compile(diffuse_program().program),
                                        PrincipledV2().material()};
+    ProgramBuilder bumped = diffuse_program();
+    bumped.program.operands.back() = bumped.constant({0.3f, -0.4f, 2.0f});
+    materials.push_back(compile(bumped.program));
     ProgramBuilder several = diffuse_program();
     several.add(NodeOpCode::Glass,
                 static_cast<std::uint16_t>(Distribution::Ggx),
@@ -160,6 +163,8 @@ TEST(ProgramCompile, BatchesEqualSingleHits) {
                     EXPECT_EQ(a.n, b.n);
                     EXPECT_EQ(a.sample_weight, b.sample_weight);
                     EXPECT_EQ(a.alpha_x, b.alpha_x);
+                    EXPECT_EQ(a.tangent, b.tangent);
+                    EXPECT_EQ(a.smith, b.smith);
                 }
             }
         }
