@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::uint32_t kDefaultWidth = 1024;
 constexpr std::uint32_t kMaxWidth = 4096;
+constexpr std::uint32_t kScattered = kVisibleDiffuse | kVisibleGlossy | kVisibleTransmission;
 
 struct MapSize {
     std::uint32_t width = kDefaultWidth;
@@ -83,6 +84,9 @@ void prepare_world(Scene& scene, ThreadPool& pool, const CancelFlag& cancel) {
     if (!needs.environment) {
         return;
     }
+    // A world that some scattered rays do not see is left to chance hits: a light's sample does not
+    // know which kind of ray it stands for.
+    const bool sampled = world.use_mis && (world.visibility & kScattered) == kScattered;
     std::vector<Rgb> radiance;
     MapSize size{1, 1};
     if (scene.world.constant) {
@@ -97,12 +101,12 @@ void prepare_world(Scene& scene, ThreadPool& pool, const CancelFlag& cancel) {
         needs.constant_environment = true;
         needs.environment = !is_black(scene.constant_world);
         radiance.assign(1, scene.constant_world);
-    } else if (world.use_mis) {
+    } else if (sampled) {
         size = map_size(scene);
         radiance = evaluate_map(scene, size, pool, cancel);
     }
     // A map that is black at every texel's centre is left to chance hits.
-    if (world.use_mis && !std::ranges::all_of(radiance, is_black)) {
+    if (sampled && !std::ranges::all_of(radiance, is_black)) {
         scene.environment = std::make_unique<EnvironmentLight>(radiance, size.width, size.height);
     }
 }

@@ -316,13 +316,16 @@ TEST(BuildScene, BlackAndHiddenWorldsAreSkipped) {
     hidden.world(background_program(Rgb(1), 1.0f));
     hidden.description().world.visibility = 0;
     EXPECT_FALSE(build(hidden.build()).scene->needs.environment);
-    SceneBuilder unsampled;
-    unsampled.world(background_program(Rgb(1), 1.0f));
-    unsampled.description().world.use_mis = false;
-    const Built built = build(unsampled.build());
-    EXPECT_TRUE(built.scene->needs.environment);
-    EXPECT_TRUE(built.scene->environment == nullptr);
-    EXPECT_FALSE(built.scene->needs.nee);
+    for (const bool use_mis : {false, true}) {
+        SceneBuilder unsampled;
+        unsampled.world(background_program(Rgb(1), 1.0f));
+        unsampled.description().world.use_mis = use_mis;
+        unsampled.description().world.visibility = use_mis ? kVisibleCamera | kVisibleGlossy : 31;
+        const Built built = build(unsampled.build());
+        EXPECT_TRUE(built.scene->needs.environment);
+        EXPECT_TRUE(built.scene->environment == nullptr);
+        EXPECT_FALSE(built.scene->needs.nee);
+    }
 }
 
 TEST(BuildScene, EmittersAreSampledUnlessTurnedOff) {
