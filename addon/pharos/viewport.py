@@ -21,6 +21,7 @@ from .final import stats_line
 
 _SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
 _LONGEST_INTERVAL = 0.5
+_PATIENCE = 0.5  # seconds that the last picture stands in for an unfinished one
 _DRAWING_SHARE = 0.25  # most of the time may go into rendering, not into showing it
 
 
@@ -81,6 +82,7 @@ class Viewport:
         self._picture = None
         self._texture = None
         self._report = Report()
+        self._paused = False  # a final render has the processor
         self._interval = _SHORTEST_INTERVAL
         self._start_timer()
 
@@ -98,7 +100,19 @@ class Viewport:
     def has_news(self) -> bool:
         return self._session is not None and self._session.progress().serial != self._drawn_serial
 
+    def yield_to_render(self) -> None:
+        """Stop while a final render is under way; go on from the start afterwards."""
+        rendering = bpy.app.is_job_running("RENDER")
+        if rendering and not self._paused:
+            self._session = None
+        elif self._paused and not rendering:
+            redraw_viewports()
+        self._paused = rendering
+
     def draw(self, engine, context, depsgraph) -> None:
+        if self._paused:
+            self._draw_texture(engine, context, depsgraph)
+            return
         began = time.monotonic()
         if self._description is None:
             self.scene_changed(depsgraph)
@@ -129,8 +143,11 @@ class Viewport:
         import gpu  # not there in background mode of newer versions
 
         session = self._session
-        serial = session.progress().serial
-        if serial == self._drawn_serial:
+        progress = session.progress()
+        if progress.serial == self._drawn_serial:
+            return
+        # Until each pixel has a sample the last picture looks better, but not for long.
+        if progress.samples == 0 and progress.elapsed < _PATIENCE:
             return
         pixels = output.read_pass(self._native, session, "Combined")
         if pixels is None:
@@ -140,7 +157,7 @@ class Viewport:
         self._picture = pixels
         buffer = gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
         self._texture = gpu.types.GPUTexture(size, format="RGBA16F", data=buffer)
-        self._drawn_serial = serial
+        self._drawn_serial = progress.serial
 
     def _draw_texture(self, engine, context, depsgraph) -> None:
         """The last picture there is, stretched while a new size has none yet."""
@@ -162,6 +179,7 @@ class Viewport:
             viewport = reference()
             if viewport is None:
                 return None
+            viewport.yield_to_render()
             if viewport.has_news():
                 redraw_viewports()
             return viewport._interval

@@ -63,8 +63,8 @@ def command(host: str, script: Path, env: dict[str, str]) -> list[str] | None:
         return [blender, "-b", *blender_start(script)]
     if shutil.which("xvfb-run") is None:
         return None
-    screen = "-screen 0 1280x800x24 +extension GLX"
-    window = ["--window-geometry", "0", "0", "1280", "800"]
+    screen = "-screen 0 800x600x24 +extension GLX"
+    window = ["--window-geometry", "0", "0", "800", "600"]
     return ["xvfb-run", "-a", "-s", screen, blender, *window, *blender_start(script)]
 
 

@@ -68,7 +68,7 @@ def view_state() -> tuple:
 
 def step_prepare():
     scene = harness.new_scene(64, 64, 16)
-    scene.pharos.preview_samples = 32
+    scene.pharos.preview_samples = 8
     scene.view_settings.view_transform = "Standard"
     scene.world.color = (0.2, 0.5, 0.1)
     space = area().spaces[0]
@@ -133,7 +133,7 @@ def step_delete_shows():
 def step_navigate():
     data = area().spaces[0].region_3d
     data.view_perspective = "PERSP"
-    for _ in range(10):
+    for _ in range(5):
         data.view_rotation.rotate(__import__("mathutils").Euler((0.0, 0.1, 0.3)))
         data.view_distance *= 1.05
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
@@ -170,7 +170,7 @@ def step_close_area():
 
 
 def step_toggle_shading():
-    for _ in range(15):
+    for _ in range(8):
         for kind in ("SOLID", "RENDERED"):
             shade(kind)
             bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
