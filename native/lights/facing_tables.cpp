@@ -56,7 +56,8 @@ std::size_t FacingTables::bin_of(const Vec3& direction) {
     const int face = 2 * axis + (direction[axis] < 0.0f ? 1 : 0);
     const int column = cell(direction[(axis + 1) % 3]);
     const int row = cell(direction[(axis + 2) % 3]);
-    return static_cast<std::size_t>((face * kSide + row) * kSide + column);
+    const int bin = (face * kSide + row) * kSide + column;
+    return static_cast<std::size_t>(bin);
 }
 
 }  // namespace pharos

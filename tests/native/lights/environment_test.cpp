@@ -170,7 +170,8 @@ TEST(Environment, WhiteWorldThroughTheSampler) {
         double sum = 0.0;
         constexpr int kSide = 400;
         for (int i = 0; i < kSide * kSide; ++i) {
-            const Vec2 cell(static_cast<float>(i % kSide), static_cast<float>(i / kSide));
+            const int row = i / kSide;
+            const Vec2 cell(static_cast<float>(i % kSide), static_cast<float>(row));
             const auto s = sampler.sample(context, 0.5f, (cell + random.uniform2()) / float{kSide});
             ASSERT_TRUE(s && s->environment);
             EXPECT_EQ(s->sample.distance, kInfinity);

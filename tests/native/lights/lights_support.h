@@ -97,7 +97,7 @@ inline double hit_radiance(const LightSampler& sampler, const LightSampleContext
 inline std::optional<LightHit> hit_along(const LightSampler& sampler,
                                          const LightSampleContext& context,
                                          const Vec3& wi) {
-    if (const auto hit = sampler.intersect_lamps({context.p, wi}, &context)) {
+    if (auto hit = sampler.intersect_lamps({context.p, wi}, &context)) {
         return hit;
     }
     return sampler.sun_count() > 0 ? sampler.sun_hit(0, wi, &context) : std::nullopt;

@@ -135,6 +135,7 @@ TEST(Selection, TreeFindsWhatBruteForceFinds) {
     const std::vector<LightDescription> descriptions = random_lamps(500, 4);
     for (const std::uint32_t version : {304u, 405u}) {
         std::vector<Lamp> lamps;
+        lamps.reserve(descriptions.size());
         for (const LightDescription& d : descriptions) {
             lamps.push_back(*make_lamp(d, version, 0));
         }
