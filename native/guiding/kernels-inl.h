@@ -257,6 +257,23 @@ float train_chunk_kernel(const NetworkView& view,
     return sum_lanes(loss);
 }
 
+void sample_mixtures_kernel(std::span<const VmfMixture> mixtures,
+                            std::span<const float> u_lobe,
+                            std::span<const Vec2> u,
+                            std::span<Vec3> wi) {
+    for (std::size_t i = 0; i < mixtures.size(); ++i) {
+        wi[i] = HWY_NAMESPACE::sample_mixture(mixtures[i], u_lobe[i], u[i]);
+    }
+}
+
+void mixture_pdfs_kernel(std::span<const VmfMixture> mixtures,
+                         std::span<const Vec3> wi,
+                         std::span<float> pdf) {
+    for (std::size_t i = 0; i < mixtures.size(); ++i) {
+        pdf[i] = HWY_NAMESPACE::mixture_pdf(mixtures[i], wi[i]);
+    }
+}
+
 void adam_kernel(const AdamStep& step, const AdamArrays& arrays) {
     const float* gradient = arrays.gradient.data();
     float* first = arrays.first_moment.data();

@@ -19,6 +19,7 @@ HWY_BEFORE_NAMESPACE();
 // clang-format off
 #include "guiding/simd_math-inl.h"
 #include "guiding/vmf-inl.h"
+#include "guiding/mixture-inl.h"
 #include "guiding/network-inl.h"
 #include "guiding/decode-inl.h"
 #include "guiding/kernels-inl.h"
@@ -33,6 +34,8 @@ HWY_EXPORT(evaluate_kernel);
 HWY_EXPORT(evaluate_chunk_kernel);
 HWY_EXPORT(train_chunk_kernel);
 HWY_EXPORT(adam_kernel);
+HWY_EXPORT(sample_mixtures_kernel);
+HWY_EXPORT(mixture_pdfs_kernel);
 
 std::size_t workspace_size(const NetworkLayout& layout) {
     // All activations, and two buffers of gradients that swap.
@@ -70,6 +73,24 @@ float train_chunk(const NetworkView& view,
     CHECK_EQ(gradient.size(), view.layout->mlp_parameters);
     return HWY_DYNAMIC_DISPATCH(train_chunk_kernel)(
         view, columns, first, workspace.data(), gradient.data());
+}
+
+void sample_mixtures(std::span<const VmfMixture> mixtures,
+                     std::span<const float> u_lobe,
+                     std::span<const Vec2> u,
+                     std::span<Vec3> wi) {
+    CHECK_EQ(mixtures.size(), u_lobe.size());
+    CHECK_EQ(mixtures.size(), u.size());
+    CHECK_EQ(mixtures.size(), wi.size());
+    HWY_DYNAMIC_DISPATCH(sample_mixtures_kernel)(mixtures, u_lobe, u, wi);
+}
+
+void mixture_pdfs(std::span<const VmfMixture> mixtures,
+                  std::span<const Vec3> wi,
+                  std::span<float> pdf) {
+    CHECK_EQ(mixtures.size(), wi.size());
+    CHECK_EQ(mixtures.size(), pdf.size());
+    HWY_DYNAMIC_DISPATCH(mixture_pdfs_kernel)(mixtures, wi, pdf);
 }
 
 void adam_update(const AdamStep& step, const AdamArrays& arrays) {

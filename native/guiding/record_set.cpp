@@ -1,6 +1,7 @@
 #include "guiding/record_set.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -41,29 +42,50 @@ struct OrderedRecord {
     float target;  // raw, not in units of the scale
 };
 
-// Sorts by hash: one pass over buckets of the top bits, then each small bucket.
+// Sorts by hash: radix passes over the upper half of the bits, then insertion for what they leave
+// (equal upper halves are rare). Equal hashes keep the order of arrival: keys are unique by
+// contract.
 void sort_by_hash(std::vector<OrderedRecord>& records) {
-    constexpr int kBits = 12;
-    std::vector<std::uint32_t> start((1u << kBits) + 1, 0);
+    constexpr int kBits = 11;
+    constexpr std::size_t kBuckets = std::size_t{1} << kBits;
+    std::vector<OrderedRecord> other(records.size());
+    for (int shift = 64 - 3 * kBits; shift < 64; shift += kBits) {
+        const auto bucket = [shift](const OrderedRecord& r) {
+            return static_cast<std::size_t>(r.hash >> shift) & (kBuckets - 1);
+        };
+        std::array<std::uint32_t, kBuckets + 1> start{};
+        for (const OrderedRecord& r : records) {
+            ++start[bucket(r) + 1];
+        }
+        for (std::size_t i = 1; i <= kBuckets; ++i) {
+            start[i] += start[i - 1];
+        }
+        for (const OrderedRecord& r : records) {
+            other[start[bucket(r)]++] = r;
+        }
+        records.swap(other);
+    }
+    for (std::size_t i = 1; i < records.size(); ++i) {
+        const OrderedRecord r = records[i];
+        std::size_t at = i;
+        for (; at > 0 && r.hash < records[at - 1].hash; --at) {
+            records[at] = records[at - 1];
+        }
+        records[at] = r;
+    }
+}
+
+// Mean of min(target / unit, limit), added up in whole numbers so that order does not matter.
+double limited_mean(const std::vector<OrderedRecord>& records, float unit, float limit) {
+    constexpr double kStep = 0x1p-20;
+    const double scale = 1.0 / (static_cast<double>(unit) * kStep);
+    const double largest = static_cast<double>(limit) / kStep;
+    std::int64_t sum = 0;
     for (const OrderedRecord& r : records) {
-        ++start[(r.hash >> (64 - kBits)) + 1];
+        sum += static_cast<std::int64_t>(std::min(static_cast<double>(r.target) * scale, largest));
     }
-    for (std::size_t i = 1; i < start.size(); ++i) {
-        start[i] += start[i - 1];
-    }
-    std::vector<OrderedRecord> sorted(records.size());
-    std::vector<std::uint32_t> next(start.begin(), start.end() - 1);
-    for (const OrderedRecord& r : records) {
-        sorted[next[r.hash >> (64 - kBits)]++] = r;
-    }
-    for (std::size_t i = 0; i + 1 < start.size(); ++i) {
-        std::sort(sorted.begin() + start[i],
-                  sorted.begin() + start[i + 1],
-                  [](const OrderedRecord& a, const OrderedRecord& b) {
-                      return a.hash != b.hash ? a.hash < b.hash : a.index < b.index;
-                  });
-    }
-    records.swap(sorted);
+    return static_cast<double>(sum) * kStep /
+           std::max<double>(1.0, static_cast<double>(records.size()));
 }
 
 // Mean with outliers cut at 1000 medians of the positive values, 0 without any.
@@ -79,31 +101,39 @@ float robust_mean(const std::vector<OrderedRecord>& records) {
     }
     const auto middle = positive.begin() + static_cast<std::ptrdiff_t>(positive.size() / 2);
     std::nth_element(positive.begin(), middle, positive.end());
-    const double limit = 1000.0 * static_cast<double>(*middle);
-    double sum = 0.0;
-    for (const OrderedRecord& r : records) {
-        sum += std::min(static_cast<double>(r.target), limit);
-    }
-    return static_cast<float>(std::clamp(sum / static_cast<double>(records.size()), 1e-30, 1e30));
+    const double mean = static_cast<double>(*middle) * limited_mean(records, *middle, 1000.0f);
+    return static_cast<float>(std::clamp(mean, 1e-30, 1e30));
 }
 
 float update_scale(const std::vector<OrderedRecord>& records, float scale) {
-    if (scale > 0.0f) {
-        const double limit = 1e6 * static_cast<double>(scale);
-        double sum = 0.0;
-        for (const OrderedRecord& r : records) {
-            sum += std::min(static_cast<double>(r.target), limit);
-        }
-        const double mean = sum / std::max<double>(1.0, static_cast<double>(records.size()));
-        const double ratio = mean / static_cast<double>(scale);
-        if (ratio > 1e-4 && ratio < 1e4) {
-            return scale;
-        }
-        const float measured = robust_mean(records);
-        const bool left = measured > 0.0f && (measured > 1e4f * scale || measured < 1e-4f * scale);
-        return left ? measured : scale;
+    if (!(scale > 0.0f)) {
+        return robust_mean(records);
     }
-    return robust_mean(records);
+    const double ratio = limited_mean(records, scale, 1e6f);
+    if (ratio > 1e-4 && ratio < 1e4) {
+        return scale;
+    }
+    const float measured = robust_mean(records);
+    const bool left = measured > 0.0f && (measured > 1e4f * scale || measured < 1e-4f * scale);
+    return left ? measured : scale;
+}
+
+// Fills a set in the order of hashes.
+void fill_set(std::span<const RadianceRecord> records,
+              std::vector<OrderedRecord>& order,
+              float scale,
+              float zero_weight,
+              RecordSet& set) {
+    constexpr std::size_t kAhead = 12;
+    sort_by_hash(order);
+    set.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        if (i + kAhead < order.size()) {
+            __builtin_prefetch(&records[order[i + kAhead].index]);
+        }
+        const float target = std::min(order[i].target / scale, kTargetLimit);
+        set.set(i, records[order[i].index], target, order[i].target == 0.0f ? zero_weight : 1.0f);
+    }
 }
 
 }  // namespace
@@ -148,49 +178,39 @@ void prepare_records(const GuidingConfig& config,
                      std::span<const RadianceRecord> records,
                      float scale,
                      PreparedRecords& out) {
-    std::vector<OrderedRecord> order;
-    order.reserve(records.size());
+    std::vector<OrderedRecord> valid;
+    valid.reserve(records.size());
     for (std::size_t i = 0; i < records.size(); ++i) {
         if (is_valid(records[i])) {
-            order.push_back(
+            valid.push_back(
                 {mix_bits(records[i].key + 0x9e3779b97f4a7c15ull * (config.seed + 1ull)),
                  static_cast<std::uint32_t>(i),
                  raw_target(config, records[i])});
         }
     }
-    out.invalid = records.size() - order.size();
-    sort_by_hash(order);
-    out.scale = update_scale(order, scale);
-    // Which set a record goes to, by bits of its own: 0 dropped, 1 training, 2 held out.
-    const auto held_out_limit =
-        static_cast<std::uint64_t>(static_cast<double>(config.held_out) * 0x1p32);
-    const auto keep_limit =
-        static_cast<std::uint64_t>(static_cast<double>(config.zero_keep) * 0x1p32);
-    std::vector<std::uint8_t> destination(order.size());
-    std::size_t count[3] = {};
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        const bool held_out = (order[i].hash & 0xffffffffull) < held_out_limit;
-        const bool thinned =
-            order[i].target == 0.0f && (mix_bits(order[i].hash) >> 32) >= keep_limit;
-        destination[i] = held_out ? 2 : (thinned ? 0 : 1);
-        ++count[destination[i]];
-    }
-    out.training.resize(out.scale > 0.0f ? count[1] : 0);
-    out.held_out.resize(out.scale > 0.0f ? count[2] : 0);
-    if (!(out.scale > 0.0f)) {
-        return;
-    }
-    std::size_t next[3] = {};
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        if (destination[i] == 0) {
-            continue;
+    out.invalid = records.size() - valid.size();
+    out.scale = update_scale(valid, scale);
+    // Held out, thinned or trained on: by bits of the hash, so by the key alone.
+    const auto limit_of = [](float share) {
+        return static_cast<std::uint64_t>(static_cast<double>(share) * 0x1p32);
+    };
+    const std::uint64_t held_out_limit = limit_of(config.held_out);
+    const std::uint64_t keep_limit = limit_of(config.zero_keep);
+    std::vector<OrderedRecord> training;
+    std::vector<OrderedRecord> held_out;
+    training.reserve(valid.size());
+    for (const OrderedRecord& r : valid) {
+        if (!(out.scale > 0.0f)) {
+            break;
         }
-        const float target = std::min(order[i].target / out.scale, kTargetLimit);
-        RecordSet& set = destination[i] == 1 ? out.training : out.held_out;
-        const float weight =
-            destination[i] == 1 && order[i].target == 0.0f ? 1.0f / config.zero_keep : 1.0f;
-        set.set(next[destination[i]]++, records[order[i].index], target, weight);
+        if ((r.hash & 0xffffffffull) < held_out_limit) {
+            held_out.push_back(r);
+        } else if (r.target > 0.0f || (mix_bits(r.hash) >> 32) < keep_limit) {
+            training.push_back(r);
+        }
     }
+    fill_set(records, training, out.scale, 1.0f / config.zero_keep, out.training);
+    fill_set(records, held_out, out.scale, 1.0f, out.held_out);
 }
 
 }  // namespace pharos

@@ -65,6 +65,15 @@ PHAROS_SIMD_INLINE F sample_one_minus_cos(const F& kappa, const F& u) {
     return simd::min(simd::max(r, F{}), simd::broadcast<F>(2.0f));
 }
 
+// One direction; u in [0, 1)^2.
+PHAROS_SIMD_INLINE Vec3 sample(const Vec3& mu, float kappa, const Vec2& u) {
+    const float r = sample_one_minus_cos<float>(clamp_kappa<float>(kappa), u.x);
+    const float sine = __builtin_sqrtf(r * (2.0f - r));
+    const simd::SinCos<float> azimuth = simd::sincos_turns<float>(u.y);
+    const Frame frame = Frame::from_z(mu);
+    return frame.to_world(Vec3(sine * azimuth.cos, sine * azimuth.sin, 1.0f - r));
+}
+
 }  // namespace vmf
 }  // namespace PHAROS_SIMD_NAMESPACE
 }  // namespace pharos

@@ -61,11 +61,7 @@ PHAROS_SIMD_INLINE float vmf_log_pdf(const VmfLobe& lobe, const Vec3& w) {
 
 // Direction with density vmf_pdf; u in [0, 1)^2.
 PHAROS_SIMD_INLINE Vec3 sample_vmf(const VmfLobe& lobe, const Vec2& u) {
-    const float r = vmf::sample_one_minus_cos<float>(vmf::clamp_kappa(lobe.kappa), u.x);
-    const float sine = __builtin_sqrtf(r * (2.0f - r));
-    const simd::SinCos<float> azimuth = simd::sincos_turns<float>(u.y);
-    const Frame frame = Frame::from_z(lobe.mu);
-    return frame.to_world(Vec3(sine * azimuth.cos, sine * azimuth.sin, 1.0f - r));
+    return vmf::sample(lobe.mu, lobe.kappa, u);
 }
 
 struct VmfGradient {
