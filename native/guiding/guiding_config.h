@@ -36,7 +36,7 @@ struct GuidingConfig {
     int hidden_layers = 2;    // 1 ... 6
     int lobes = 8;            // 1 ... 8
     float leaky_slope = 0.01f;
-    MuActivation mu = MuActivation::Sigmoid;
+    MuActivation mu = MuActivation::Raw;  // learns sharp lights faster than Sigmoid, and costs less
     KappaActivation kappa = KappaActivation::Exponential;
     float kappa_max = 3e4f;
 
@@ -60,6 +60,7 @@ struct GuidingConfig {
         GuidingConfig config;
         config.use_normal = use_normal;
         config.lobes = 1;
+        config.mu = MuActivation::Sigmoid;
         config.loss = GuidingLoss::RelativeSquared;
         config.target_cosine = false;
         return config;

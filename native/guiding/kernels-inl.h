@@ -17,32 +17,37 @@ inline float* forward(const NetworkView& view, float* inputs, float* other) {
 
 using F8 [[gnu::vector_size(32)]] = float;
 
-// Eight rows of lanes become eight records of eight floats.
-PHAROS_SIMD_INLINE F8 row_of_8(const float* p) {
-    F8 v;
-    __builtin_memcpy(&v, p, sizeof(v));
-    return v;
+// Four floats from each of two places.
+PHAROS_SIMD_INLINE F8 two_halves(const float* low, const float* high) {
+    using F4 [[gnu::vector_size(16)]] = float;
+    F4 a;
+    F4 b;
+    __builtin_memcpy(&a, low, sizeof(a));
+    __builtin_memcpy(&b, high, sizeof(b));
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
+// Eight rows of lanes become eight records of eight floats: rows i and i + 4 share a vector from
+// the start, so that all shuffles stay within 128 bits.
 [[gnu::always_inline]] inline void transpose_8x8(const float* rows, int stride, F8 out[8]) {
-    F8 a[8];
-    F8 b[8];
-    for (int i = 0; i < 8; ++i) {
-        a[i] = row_of_8(rows + i * stride);
-    }
-    for (int i = 0; i < 8; i += 2) {
-        b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-        b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    for (int i = 0; i < 8; i += 4) {
-        a[i] = __builtin_shufflevector(b[i], b[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 1] = __builtin_shufflevector(b[i], b[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        a[i + 2] = __builtin_shufflevector(b[i + 1], b[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
-        a[i + 3] = __builtin_shufflevector(b[i + 1], b[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-    for (int i = 0; i < 4; ++i) {
-        out[i] = __builtin_shufflevector(a[i], a[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        out[i + 4] = __builtin_shufflevector(a[i], a[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+#pragma GCC unroll 2
+    for (int half = 0; half < 2; ++half) {
+        F8 a[4];
+        F8 b[4];
+#pragma GCC unroll 4
+        for (int i = 0; i < 4; ++i) {
+            a[i] = two_halves(rows + i * stride + 4 * half, rows + (i + 4) * stride + 4 * half);
+        }
+#pragma GCC unroll 2
+        for (int i = 0; i < 4; i += 2) {
+            b[i] = __builtin_shufflevector(a[i], a[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+            b[i + 1] = __builtin_shufflevector(a[i], a[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+        }
+        F8* to = out + 4 * half;
+        to[0] = __builtin_shufflevector(b[0], b[2], 0, 1, 8, 9, 4, 5, 12, 13);
+        to[1] = __builtin_shufflevector(b[0], b[2], 2, 3, 10, 11, 6, 7, 14, 15);
+        to[2] = __builtin_shufflevector(b[1], b[3], 0, 1, 8, 9, 4, 5, 12, 13);
+        to[3] = __builtin_shufflevector(b[1], b[3], 2, 3, 10, 11, 6, 7, 14, 15);
     }
 }
 

@@ -94,75 +94,110 @@ inline void encode(const NetworkView& view,
     }
 }
 
-// Vectors of samples in a register tile: 16 accumulators with 32 registers, 8 with 16.
-inline constexpr int kForwardVectors = PHAROS_VECTOR_BYTES == 64 ? 4 : 2;
+// Vectors of samples in a register tile of four rows: 16 accumulators of 32 registers, 12 of 16.
+inline constexpr int kTileVectors = PHAROS_VECTOR_BYTES == 64 ? 4 : 3;
 
-// y = activation(W x + b); slope 1 is the identity.
-template <int kStride>
-inline void layer_forward(const LayerShape& shape,
-                          const float* parameters,
-                          float slope,
-                          const float* __restrict x,
-                          float* __restrict y) {
-    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
-    const int inputs = shape.inputs;
-    const float* bias = parameters + shape.biases;
-    for (int row = 0; row < shape.rows; row += kRowTile) {
-        const float* weight = parameters + shape.weights + row * inputs;
-        for (int s = 0; s < kStride; s += kVectors * kLanes) {
-            V sum[kRowTile][kVectors];
-#pragma GCC unroll 16
-            for (int i = 0; i < kRowTile; ++i) {
-#pragma GCC unroll 16
-                for (int v = 0; v < kVectors; ++v) {
-                    sum[i][v] = simd::broadcast<V>(bias[row + i]);
-                }
-            }
-            const float* input = x + s;
-            for (int k = 0; k < inputs; ++k, input += kStride) {
-#pragma GCC unroll 16
-                for (int v = 0; v < kVectors; ++v) {
-                    const V in = load(input + v * kLanes);
-#pragma GCC unroll 16
-                    for (int i = 0; i < kRowTile; ++i) {
-                        sum[i][v] += weight[i * inputs + k] * in;
-                    }
-                }
-            }
-#pragma GCC unroll 16
-            for (int i = 0; i < kRowTile; ++i) {
-#pragma GCC unroll 16
-                for (int v = 0; v < kVectors; ++v) {
-                    // slope < 1: the larger of the two is the leaky ReLU
-                    const V out = simd::max(sum[i][v], slope * sum[i][v]);
-                    store(y + (row + i) * kStride + s + v * kLanes, out);
-                }
-            }
-        }
+// Calls tile.template run<count>(first) over `kVectors` vectors, in tiles of kTileVectors and at
+// the end of two.
+template <int kVectors, int kFirst = 0, class Tile>
+[[gnu::always_inline]] inline void for_each_tile(const Tile& tile) {
+    constexpr int kLeft = kVectors - kFirst;
+    if constexpr (kLeft > 0) {
+        constexpr bool kWhole = kLeft >= kTileVectors && kLeft - kTileVectors != 1;
+        constexpr int kCount = kWhole ? kTileVectors : std::min(2, kLeft);
+        tile.template run<kCount>(kFirst * kLanes);
+        for_each_tile<kVectors, kFirst + kCount>(tile);
     }
 }
 
-// kRows inputs of layer_backward_inputs, from input k on.
+// Four outputs of a layer: y = activation(W x + b); slope 1 is the identity.
+template <int kStride>
+struct ForwardTile {
+    const float* __restrict weight;
+    const float* __restrict bias;
+    int inputs;
+    float slope;
+    const float* __restrict x;
+    float* __restrict y;
+
+    template <int kVectors>
+    [[gnu::always_inline]] void run(int s) const {
+        V sum[kRowTile][kVectors];
+#pragma GCC unroll 16
+        for (int i = 0; i < kRowTile; ++i) {
+#pragma GCC unroll 16
+            for (int v = 0; v < kVectors; ++v) {
+                sum[i][v] = simd::broadcast<V>(bias[i]);
+            }
+        }
+        const float* input = x + s;
+        for (int k = 0; k < inputs; ++k, input += kStride) {
+            V in[kVectors];
+#pragma GCC unroll 16
+            for (int v = 0; v < kVectors; ++v) {
+                in[v] = load(input + v * kLanes);
+            }
+#pragma GCC unroll 16
+            for (int i = 0; i < kRowTile; ++i) {
+                const float w = weight[i * inputs + k];
+#pragma GCC unroll 16
+                for (int v = 0; v < kVectors; ++v) {
+                    sum[i][v] += w * in[v];
+                }
+            }
+        }
+#pragma GCC unroll 16
+        for (int i = 0; i < kRowTile; ++i) {
+#pragma GCC unroll 16
+            for (int v = 0; v < kVectors; ++v) {
+                // slope < 1: the larger of the two is the leaky ReLU
+                store(y + i * kStride + s + v * kLanes, simd::max(sum[i][v], slope * sum[i][v]));
+            }
+        }
+    }
+};
+
+template <int kStride>
+inline void layer_forward(
+    const LayerShape& shape, const float* parameters, float slope, const float* x, float* y) {
+    for (int row = 0; row < shape.rows; row += kRowTile) {
+        const ForwardTile<kStride> tile{parameters + shape.weights + row * shape.inputs,
+                                        parameters + shape.biases + row,
+                                        shape.inputs,
+                                        slope,
+                                        x,
+                                        y + row * kStride};
+        for_each_tile<kStride / kLanes>(tile);
+    }
+}
+
+// kRows inputs of layer_backward_inputs.
 template <int kStride, int kRows>
-[[gnu::always_inline]] inline void backward_inputs_tile(const LayerShape& shape,
-                                                        const float* __restrict weight,
-                                                        float slope,
-                                                        const float* __restrict dy,
-                                                        const float* __restrict x,
-                                                        float* __restrict dx) {
-    constexpr int kVectors = std::min(kForwardVectors, kStride / kLanes);
-    const int inputs = shape.inputs;
-    for (int s = 0; s < kStride; s += kVectors * kLanes) {
+struct BackwardInputsTile {
+    const float* __restrict weight;
+    int inputs;
+    int outputs;
+    float slope;
+    const float* __restrict dy;
+    const float* __restrict x;
+    float* __restrict dx;
+
+    template <int kVectors>
+    [[gnu::always_inline]] void run(int s) const {
         V sum[kRows][kVectors] = {};
         const float* out = dy + s;
         const float* w = weight;
-        for (int row = 0; row < shape.outputs; ++row, w += inputs, out += kStride) {
+        for (int row = 0; row < outputs; ++row, w += inputs, out += kStride) {
+            V in[kVectors];
 #pragma GCC unroll 16
             for (int v = 0; v < kVectors; ++v) {
-                const V in = load(out + v * kLanes);
+                in[v] = load(out + v * kLanes);
+            }
 #pragma GCC unroll 16
-                for (int i = 0; i < kRows; ++i) {
-                    sum[i][v] += w[i] * in;
+            for (int i = 0; i < kRows; ++i) {
+#pragma GCC unroll 16
+                for (int v = 0; v < kVectors; ++v) {
+                    sum[i][v] += w[i] * in[v];
                 }
             }
         }
@@ -176,7 +211,7 @@ template <int kStride, int kRows>
             }
         }
     }
-}
+};
 
 // dx = W^T dy, times the slope where the activation x (an output of the layer below) is negative.
 template <int kStride>
@@ -187,14 +222,18 @@ inline void layer_backward_inputs(const LayerShape& shape,
                                   const float* x,
                                   float* dx) {
     const float* weight = parameters + shape.weights;
+    const int inputs = shape.inputs;
+    const int outputs = shape.outputs;
     int k = 0;
-    for (; k + kRowTile <= shape.inputs; k += kRowTile) {
+    for (; k + kRowTile <= inputs; k += kRowTile) {
         const int at = k * kStride;
-        backward_inputs_tile<kStride, kRowTile>(shape, weight + k, slope, dy, x + at, dx + at);
+        for_each_tile<kStride / kLanes>(BackwardInputsTile<kStride, kRowTile>{
+            weight + k, inputs, outputs, slope, dy, x + at, dx + at});
     }
-    for (; k < shape.inputs; ++k) {
+    for (; k < inputs; ++k) {
         const int at = k * kStride;
-        backward_inputs_tile<kStride, 1>(shape, weight + k, slope, dy, x + at, dx + at);
+        for_each_tile<kStride / kLanes>(BackwardInputsTile<kStride, 1>{
+            weight + k, inputs, outputs, slope, dy, x + at, dx + at});
     }
 }
 

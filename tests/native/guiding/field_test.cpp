@@ -186,7 +186,7 @@ TEST(Field, EveryPresetLearns) {
     configs.back().grid_log2_size = 10;
     configs.emplace_back();
     configs.back().kappa = KappaActivation::Quadratic;
-    configs.back().mu = MuActivation::Raw;
+    configs.back().mu = MuActivation::Sigmoid;
     for (const GuidingConfig& config : configs) {
         GuidingField field(config, unit_box());
         const Quality before = quality(field, one_light);

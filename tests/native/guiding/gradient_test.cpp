@@ -28,9 +28,9 @@ std::vector<Case> cases() {
     GuidingConfig c;
     out.push_back({"default", c});
     c.lobes = 3;
-    c.mu = MuActivation::Raw;
+    c.mu = MuActivation::Sigmoid;
     c.kappa = KappaActivation::Quadratic;
-    out.push_back({"raw, quadratic, 3 lobes", c});
+    out.push_back({"sigmoid, quadratic, 3 lobes", c});
     c = GuidingConfig::slides();
     out.push_back({"slides", c});
     c = GuidingConfig::slides(false);
