@@ -62,13 +62,10 @@ _PRINCIPLED_V2 = (
     ("Tangent", 0),
 )
 
-# Features whose lobe does not exist yet: input and how the report names it.
+# Features that are missing or approximated: input and how the report names it.
 _NOT_YET = {
-    "Subsurface": "subsurface",
-    "Subsurface Weight": "subsurface",
-    "Sheen": "sheen",
-    "Sheen Weight": "sheen",
-    "Anisotropic": "anisotropy",
+    "Subsurface": "subsurface scattering (diffuse instead)",
+    "Subsurface Weight": "subsurface scattering (diffuse instead)",
     "Anisotropy": "anisotropy",
     "Thin Film Thickness": "thin film",
 }
