@@ -33,6 +33,10 @@ struct Decoded {
     V log_integral_slope;
 };
 
+// Every step below is a loop of its own over the lobes: short chains of dependent operations that
+// the processor can overlap, where one long chain per lobe would wait for itself.
+
+// Softmax. No weight falls below exp(-40) of the largest: nothing becomes denormal.
 [[gnu::always_inline]] inline void decode_weights(const float* rows,
                                                   int stride,
                                                   int lobes,
@@ -43,7 +47,8 @@ struct Decoded {
     }
     V sum{};
     for (int k = 0; k < lobes; ++k) {
-        out.weight[k] = simd::exp<V>(load(rows + k * stride) - largest);
+        const V x = simd::max(load(rows + k * stride) - largest, simd::broadcast<V>(-40.0f));
+        out.weight[k] = simd::exp_bounded<V>(x);
         sum += out.weight[k];
     }
     const V inverse = 1.0f / sum;
@@ -52,74 +57,100 @@ struct Decoded {
     }
 }
 
-// Direction: the slides' 2 sigmoid(x) - 1 per axis, or x itself; then normalised. A vector too
-// short to have a direction becomes +z, with gradient zero.
-[[gnu::always_inline]] inline void decode_mu(
-    const float* rows, int stride, bool sigmoid, int k, Decoded& out) {
-    V v[3];
-    V raw[3];
-    const V bound = simd::broadcast<V>(sigmoid ? 20.0f : 1e4f);
+// The slides' 2 sigmoid(x) - 1 per axis.
+[[gnu::always_inline]] inline void decode_sigmoid(const float* rows,
+                                                  int stride,
+                                                  int k,
+                                                  Decoded& out) {
+    const V bound = simd::broadcast<V>(20.0f);
+    V e[3];
     for (int axis = 0; axis < 3; ++axis) {
-        raw[axis] = simd::min(simd::max(load(rows + axis * stride), -bound), bound);
+        const V raw = simd::min(simd::max(load(rows + axis * stride), -bound), bound);
+        e[axis] = 1.0f + simd::exp_bounded<V>(raw);
     }
-    if (sigmoid) {
-        // One division for three: 1 / (1 + e) = (product of the other two) / (product of all).
-        V e[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            e[axis] = 1.0f + simd::exp_bounded<V>(raw[axis]);
-        }
-        const V all = 2.0f / (e[0] * e[1] * e[2]);
-        v[0] = 1.0f - all * (e[1] * e[2]);
-        v[1] = 1.0f - all * (e[0] * e[2]);
-        v[2] = 1.0f - all * (e[0] * e[1]);
-        for (int axis = 0; axis < 3; ++axis) {
-            out.mu_slope[k][axis] = 0.5f - 0.5f * v[axis] * v[axis];
-        }
-    } else {
-        for (int axis = 0; axis < 3; ++axis) {
-            v[axis] = raw[axis];
-            out.mu_slope[k][axis] = simd::broadcast<V>(1.0f);
-        }
+    // One division for three: 1 / (1 + e) = (product of the other two) / (product of all).
+    const V all = 2.0f / (e[0] * e[1] * e[2]);
+    out.mu[k][0] = 1.0f - all * (e[1] * e[2]);
+    out.mu[k][1] = 1.0f - all * (e[0] * e[2]);
+    out.mu[k][2] = 1.0f - all * (e[0] * e[1]);
+    for (int axis = 0; axis < 3; ++axis) {
+        out.mu_slope[k][axis] = 0.5f - 0.5f * out.mu[k][axis] * out.mu[k][axis];
     }
-    const V length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    const auto none = length2 < 1e-10f;
-    const V inverse =
-        simd::select(none, V{}, simd::rsqrt<V>(simd::max(length2, simd::broadcast<V>(1e-10f))));
-    out.inverse_length[k] = inverse;
-    out.mu[k][0] = v[0] * inverse;
-    out.mu[k][1] = v[1] * inverse;
-    out.mu[k][2] = simd::select(none, simd::broadcast<V>(1.0f), v[2] * inverse);
 }
 
-[[gnu::always_inline]] inline void decode_kappa(const V& x,
+// Normalises the directions. A vector too short or too long for that becomes +z, with gradient
+// zero.
+[[gnu::always_inline]] inline void normalize_mu(int k, Decoded& out) {
+    V* v = out.mu[k];
+    const V length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    const V limited =
+        simd::min(simd::max(length2, simd::broadcast<V>(1e-10f)), simd::broadcast<V>(1e20f));
+    const auto usable = limited == length2;
+    const V inverse = simd::select(usable, simd::rsqrt<V>(limited), V{});
+    out.inverse_length[k] = inverse;
+    v[0] = v[0] * inverse;
+    v[1] = v[1] * inverse;
+    v[2] = simd::select(usable, v[2] * inverse, simd::broadcast<V>(1.0f));
+}
+
+[[gnu::always_inline]] inline void decode_mu(const float* rows,
+                                             int stride,
+                                             const GuidingConfig& config,
+                                             Decoded& out) {
+    const int lobes = config.lobes;
+    for (int k = 0; k < lobes; ++k) {
+        if (config.mu == MuActivation::Sigmoid) {
+            decode_sigmoid(rows + k * stride, lobes * stride, k, out);
+        } else {
+            for (int axis = 0; axis < 3; ++axis) {
+                out.mu[k][axis] = load(rows + (axis * lobes + k) * stride);
+                out.mu_slope[k][axis] = simd::broadcast<V>(1.0f);
+            }
+        }
+    }
+    for (int k = 0; k < lobes; ++k) {
+        normalize_mu(k, out);
+    }
+}
+
+[[gnu::always_inline]] inline void decode_kappa(const float* rows,
+                                                int stride,
                                                 const GuidingConfig& config,
-                                                int k,
                                                 Decoded& out) {
+    const int lobes = config.lobes;
     if (config.kappa == KappaActivation::Exponential) {
         const float low = __builtin_logf(kMinKappa);
         const float high = __builtin_logf(config.kappa_max);
-        const SmoothLimit limited = smooth_limit(x, 0.5f * (low + high), 0.5f * (high - low));
-        out.kappa[k] = simd::exp_bounded<V>(limited.value);
-        out.log_kappa_slope[k] = limited.slope;
+        for (int k = 0; k < lobes; ++k) {
+            const SmoothLimit limited =
+                smooth_limit(load(rows + k * stride), 0.5f * (low + high), 0.5f * (high - low));
+            out.kappa[k] = limited.value;
+            out.log_kappa_slope[k] = limited.slope;
+        }
+        for (int k = 0; k < lobes; ++k) {
+            out.kappa[k] = simd::exp_bounded<V>(out.kappa[k]);
+        }
     } else {
         // x^2 / (1 + x^2 / max) + min
-        const V raw = simd::min(simd::max(x, simd::broadcast<V>(-1e6f)), simd::broadcast<V>(1e6f));
-        const V shrink = 1.0f / (1.0f + raw * raw * (1.0f / config.kappa_max));
-        out.kappa[k] = raw * raw * shrink + kMinKappa;
-        out.log_kappa_slope[k] = 2.0f * raw * shrink * shrink / out.kappa[k];
+        const V bound = simd::broadcast<V>(1e6f);
+        for (int k = 0; k < lobes; ++k) {
+            const V x = simd::min(simd::max(load(rows + k * stride), -bound), bound);
+            const V shrink = 1.0f / (1.0f + x * x * (1.0f / config.kappa_max));
+            out.kappa[k] = x * x * shrink + kMinKappa;
+            out.log_kappa_slope[k] = 2.0f * x * shrink * shrink / out.kappa[k];
+        }
     }
-    out.normalization[k] = vmf::normalization<V>(out.kappa[k]);
+    for (int k = 0; k < lobes; ++k) {
+        out.normalization[k] = vmf::normalization_of_sharp<V>(out.kappa[k]);
+    }
 }
 
 // `rows` points at one vector of samples in the last layer's first row.
 inline void decode(const float* rows, int stride, const GuidingConfig& config, Decoded& out) {
     const int lobes = config.lobes;
     decode_weights(rows, stride, lobes, out);
-    const bool sigmoid = config.mu == MuActivation::Sigmoid;
-    for (int k = 0; k < lobes; ++k) {
-        decode_mu(rows + (lobes + k) * stride, lobes * stride, sigmoid, k, out);
-        decode_kappa(load(rows + (4 * lobes + k) * stride), config, k, out);
-    }
+    decode_mu(rows + lobes * stride, stride, config, out);
+    decode_kappa(rows + 4 * lobes * stride, stride, config, out);
     const SmoothLimit limited = smooth_limit(load(rows + 5 * lobes * stride), 0.0f, kIntegralRange);
     out.integral = simd::exp_bounded<V>(limited.value);
     out.log_integral_slope = limited.slope;
@@ -213,8 +244,13 @@ PHAROS_SIMD_INLINE LossTerms relative_squared_terms(const V& integral,
     // rho_k = pi_k p_k / p: the lobe's responsibility (guiding: d log p / d logit_j = rho_j - pi_j)
     const V responsible = densities.part[k] * share_scale;
     store_gradient(rows + k * stride, responsible - density_share * mixture.weight[k]);
-    const V ratio = mixture.normalization[k] * 12.5663706f;
-    const V dlogkappa = vmf::dlogpdf_dlogkappa<V>(mixture.kappa[k], ratio, densities.chord2[k]);
+    // d log p / d log kappa = 1 - 2k / expm1(2k) - k chord^2 / 2. The middle term is 4 pi
+    // normalization
+    // - 2k, to a few 1e-6, and nothing beyond kappa 8.
+    const V kappa = mixture.kappa[k];
+    const V middle = mixture.normalization[k] * 12.5663706f - 2.0f * kappa;
+    const V dlogkappa =
+        1.0f - simd::select(kappa > 8.0f, V{}, middle) - 0.5f * kappa * densities.chord2[k];
     store_gradient(rows + (4 * lobes + k) * stride,
                    responsible * dlogkappa * mixture.log_kappa_slope[k]);
     // d log p / d mu = kappa (e - mu (mu . e)), e = w - mu, then through normalisation and

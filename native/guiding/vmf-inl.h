@@ -24,6 +24,15 @@ PHAROS_SIMD_INLINE F normalization(const F& kappa) {
     return two_kappa_over_one_minus_exp<F>(kappa) * 0.0795774715f;
 }
 
+// The same for kappa >= 1e-3, without the care that smaller ones need.
+template <class F>
+PHAROS_SIMD_INLINE F normalization_of_sharp(const F& kappa) {
+    const F x = simd::max<F>(-2.0f * kappa, simd::broadcast<F>(-87.0f));
+    const simd::ExpParts<F> parts = simd::exp_parts<F>(x);
+    const F one_minus_exp = (1.0f - parts.scale) - parts.scale * parts.expm1;
+    return 0.159154943f * kappa / one_minus_exp;
+}
+
 // Density relative to the centre; `chord2` = |w - mu|^2.
 template <class F>
 PHAROS_SIMD_INLINE F falloff(const F& kappa, const F& chord2) {
