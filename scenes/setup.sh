@@ -35,12 +35,19 @@ say() {
     printf '%s\n' "$*" >&2
 }
 
-# Runs a long command quietly; what it said is shown only when it fails.
+# Runs a command quietly: it is announced when it takes longer than a moment, and what it said is
+# shown only when it fails.
 quietly() {
-    local what=$1 log status
+    local what=$1 log status announcer
     shift
     log=$(mktemp)
-    say "$what ..."
+    {
+        trap 'kill "$!" 2>/dev/null; exit' TERM
+        sleep 3 >/dev/null 2>&1 &
+        wait "$!"
+        say "$what ..."
+    } &
+    announcer=$!
     if "$@" >"$log" 2>&1 </dev/null; then
         status=0
     else
@@ -48,6 +55,8 @@ quietly() {
         tail -n 60 "$log" >&2
         say "$what failed ($status)"
     fi
+    kill "$announcer" 2>/dev/null
+    wait "$announcer" 2>/dev/null
     rm -f "$log"
     return "$status"
 }
@@ -88,9 +97,7 @@ build_preset() {
     if [ ! -f "$folder/build.ninja" ]; then
         quietly "Configuring $preset" cmake -S "$PHAROS_ROOT" --preset "$preset" || return
     fi
-    if [ -n "$(ninja -C "$folder" -n "$@" 2>&1 | grep -v -e 'no work to do' -e 'Entering directory')" ]; then
-        quietly "Building $preset" ninja -C "$folder" "$@" || return
-    fi
+    quietly "Building $preset" ninja -C "$folder" "$@" || return
 }
 
 # The add-on as Blender loads it: Python files and the native module side by side.
