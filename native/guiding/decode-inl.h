@@ -232,41 +232,44 @@ PHAROS_SIMD_INLINE LossTerms relative_squared_terms(const V& integral,
     store(p, simd::select(simd::abs(g) < 1e-18f, V{}, g));
 }
 
-[[gnu::always_inline]] inline void store_lobe_gradient(const Decoded& mixture,
-                                                       const LobeDensities& densities,
-                                                       const RecordVector& record,
-                                                       const V& share_scale,
-                                                       const V& density_share,
-                                                       int k,
-                                                       int lobes,
-                                                       int stride,
-                                                       float* rows) {
-    // rho_k = pi_k p_k / p: the lobe's responsibility (guiding: d log p / d logit_j = rho_j - pi_j)
-    const V responsible = densities.part[k] * share_scale;
-    store_gradient(rows + k * stride, responsible - density_share * mixture.weight[k]);
-    // d log p / d log kappa = 1 - 2k / expm1(2k) - k chord^2 / 2. The middle term is 4 pi
-    // normalization
-    // - 2k, to a few 1e-6, and nothing beyond kappa 8.
-    const V kappa = mixture.kappa[k];
-    const V middle = mixture.normalization[k] * 12.5663706f - 2.0f * kappa;
-    const V dlogkappa =
-        1.0f - simd::select(kappa > 8.0f, V{}, middle) - 0.5f * kappa * densities.chord2[k];
-    store_gradient(rows + (4 * lobes + k) * stride,
-                   responsible * dlogkappa * mixture.log_kappa_slope[k]);
-    // d log p / d mu = kappa (e - mu (mu . e)), e = w - mu, then through normalisation and
-    // activation
-    const V* mu = mixture.mu[k];
-    V e[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        e[axis] = record.wi[axis] - mu[axis];
+// How one record's gradient goes into the rows of its lobes.
+struct LobeGradients {
+    const Decoded& mixture;
+    const LobeDensities& densities;
+    const RecordVector& record;
+    V share_scale;    // times a lobe's part of the density: what multiplies d log p_k
+    V density_share;  // the same for the whole density
+    int lobes;
+    int stride;
+    float* rows;
+
+    [[gnu::always_inline]] void store_lobe(int k) const {
+        // rho_k = pi_k p_k / p: the lobe's responsibility; d log p / d logit_k = rho_k - pi_k
+        const V responsible = densities.part[k] * share_scale;
+        store_gradient(rows + k * stride, responsible - density_share * mixture.weight[k]);
+        // d log p / d log kappa = 1 - 2k / expm1(2k) - k chord^2 / 2. The middle term is
+        // 4 pi normalization - 2k, to a few 1e-6, and nothing beyond kappa 8.
+        const V kappa = mixture.kappa[k];
+        const V middle = mixture.normalization[k] * 12.5663706f - 2.0f * kappa;
+        const V dlogkappa =
+            1.0f - simd::select(kappa > 8.0f, V{}, middle) - 0.5f * kappa * densities.chord2[k];
+        store_gradient(rows + (4 * lobes + k) * stride,
+                       responsible * dlogkappa * mixture.log_kappa_slope[k]);
+        // d log p / d mu = kappa (e - mu (mu . e)), e = w - mu, then through normalisation and
+        // activation
+        const V* mu = mixture.mu[k];
+        V e[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            e[axis] = record.wi[axis] - mu[axis];
+        }
+        const V along = e[0] * mu[0] + e[1] * mu[1] + e[2] * mu[2];
+        const V scale = responsible * kappa * mixture.inverse_length[k];
+        for (int axis = 0; axis < 3; ++axis) {
+            store_gradient(rows + ((1 + axis) * lobes + k) * stride,
+                           scale * (e[axis] - mu[axis] * along) * mixture.mu_slope[k][axis]);
+        }
     }
-    const V along = e[0] * mu[0] + e[1] * mu[1] + e[2] * mu[2];
-    const V scale = responsible * mixture.kappa[k] * mixture.inverse_length[k];
-    for (int axis = 0; axis < 3; ++axis) {
-        store_gradient(rows + ((1 + axis) * lobes + k) * stride,
-                       scale * (e[axis] - mu[axis] * along) * mixture.mu_slope[k][axis]);
-    }
-}
+};
 
 // Gradient of one vector of records into the last layer's rows, which hold the raw outputs on
 // entry. Returns the losses.
@@ -285,9 +288,10 @@ inline V record_gradient(const GuidingConfig& config,
             : relative_squared_terms(mixture.integral, densities.sum, record, config.weight_clip);
     const V share_scale = terms.log_pdf * inverse_batch / (densities.sum + kDensityFloor);
     const V density_share = densities.sum * share_scale;
+    const LobeGradients gradients{
+        mixture, densities, record, share_scale, density_share, lobes, stride, rows};
     for (int k = 0; k < lobes; ++k) {
-        store_lobe_gradient(
-            mixture, densities, record, share_scale, density_share, k, lobes, stride, rows);
+        gradients.store_lobe(k);
     }
     store_gradient(rows + 5 * lobes * stride,
                    terms.log_integral * inverse_batch * mixture.log_integral_slope);

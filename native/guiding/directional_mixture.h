@@ -75,10 +75,8 @@ inline namespace PHAROS_ISA_NAMESPACE {
     // so that large kappas do not cancel; the largest is taken out before exp.
     const Lobes8 sum = simd::max(product_kappa + kappa + kb, Lobes8{} + 1e-20f);
     const Lobes8 exponent = -kappa * kb * (dx * dx + dy * dy + dz * dz) / sum;
-    float largest = -kInfinity;
-    for (int k = 0; k < kMaxLobes; ++k) {
-        largest = coefficient[k] > 0.0f && exponent[k] > largest ? exponent[k] : largest;
-    }
+    const float largest =
+        largest_lobe(simd::select(coefficient > 0.0f, exponent, Lobes8{} - 1e30f));
     const Lobes8 scaled = coefficient * simd::exp<Lobes8>(simd::min(exponent - largest, Lobes8{}));
     const Lobes8 normalization = vmf::normalization<Lobes8>(product_kappa);
     const Lobes8 mass = scaled / normalization;

@@ -249,11 +249,12 @@ float train_chunk_kernel(const NetworkView& view,
         layer_backward_weights<kTrainChunk>(shape, dy, at.rows[l], gradient);
         if (l > 0) {
             layer_backward_inputs<kTrainChunk>(
-                shape, view.parameters, config.leaky_slope, dy, at.rows[l], spare);
+                shape, view.parameters, config.leaky_slope, {dy, at.rows[l], spare});
             dy = spare;
             std::swap(spare, other);
         } else if (config.encoding == Encoding::HashGrid) {
-            layer_backward_inputs<kTrainChunk>(shape, view.parameters, 1.0f, dy, at.rows[0], spare);
+            layer_backward_inputs<kTrainChunk>(
+                shape, view.parameters, 1.0f, {dy, at.rows[0], spare});
             __builtin_memcpy(at.rows[0],
                              spare,
                              static_cast<std::size_t>(layout.inputs) * kTrainChunk * sizeof(float));

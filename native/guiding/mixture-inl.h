@@ -9,6 +9,12 @@ PHAROS_SIMD_INLINE float sum_of_lobes(const Lobes8& v) {
     return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
 }
 
+PHAROS_SIMD_INLINE float largest_lobe(const Lobes8& v) {
+    const auto larger = [](float a, float b) { return a > b ? a : b; };
+    return larger(larger(larger(v[0], v[4]), larger(v[2], v[6])),
+                  larger(larger(v[1], v[5]), larger(v[3], v[7])));
+}
+
 PHAROS_SIMD_INLINE Lobes8 load_lobes(const float* values) {
     return *reinterpret_cast<const Lobes8*>(values);
 }

@@ -14,11 +14,14 @@ namespace pharos {
 
 struct FieldQuery;
 
-inline constexpr int kTrainChunk = 128;        // records of one training task
-inline constexpr float kDensityFloor = 1e-8f;  // added to the density inside the logarithm
-inline constexpr float kIntegralEpsilon =
-    1e-3f;  // added to A in denominators; A is in units of the scale
-inline constexpr float kGradientLimit = 20.0f;  // of one record, where the loss is quadratic
+// Records of one training task.
+inline constexpr int kTrainChunk = 128;
+// Added to the density inside the logarithm.
+inline constexpr float kDensityFloor = 1e-8f;
+// Added to A in denominators; A is in units of the scale.
+inline constexpr float kIntegralEpsilon = 1e-3f;
+// Of one record's gradient with respect to log A.
+inline constexpr float kGradientLimit = 20.0f;
 // The slides' constant in the denominator of the relative squared loss, of a field whose integral
 // is about 1: with it the dim background counts as plain squared error and the lobe finds the peak.
 inline constexpr float kFieldEpsilon = 1e-2f;

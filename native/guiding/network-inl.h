@@ -131,6 +131,8 @@ struct ForwardTile {
             }
         }
         const float* input = x + s;
+        // Unrolled so that the loop is short enough for its end to be predicted.
+#pragma GCC unroll 4
         for (int k = 0; k < inputs; ++k, input += kStride) {
             V in[kVectors];
 #pragma GCC unroll 16
@@ -187,6 +189,7 @@ struct BackwardInputsTile {
         V sum[kRows][kVectors] = {};
         const float* out = dy + s;
         const float* w = weight;
+#pragma GCC unroll 4
         for (int row = 0; row < outputs; ++row, w += inputs, out += kStride) {
             V in[kVectors];
 #pragma GCC unroll 16
@@ -213,14 +216,20 @@ struct BackwardInputsTile {
     }
 };
 
+// Rows on the way back through a layer: the gradient of its outputs, its inputs, and their
+// gradient.
+struct BackwardRows {
+    const float* dy;
+    const float* x;
+    float* dx;
+};
+
 // dx = W^T dy, times the slope where the activation x (an output of the layer below) is negative.
 template <int kStride>
 inline void layer_backward_inputs(const LayerShape& shape,
                                   const float* parameters,
                                   float slope,
-                                  const float* dy,
-                                  const float* x,
-                                  float* dx) {
+                                  const BackwardRows& rows) {
     const float* weight = parameters + shape.weights;
     const int inputs = shape.inputs;
     const int outputs = shape.outputs;
@@ -228,12 +237,12 @@ inline void layer_backward_inputs(const LayerShape& shape,
     for (; k + kRowTile <= inputs; k += kRowTile) {
         const int at = k * kStride;
         for_each_tile<kStride / kLanes>(BackwardInputsTile<kStride, kRowTile>{
-            weight + k, inputs, outputs, slope, dy, x + at, dx + at});
+            weight + k, inputs, outputs, slope, rows.dy, rows.x + at, rows.dx + at});
     }
     for (; k < inputs; ++k) {
         const int at = k * kStride;
         for_each_tile<kStride / kLanes>(BackwardInputsTile<kStride, 1>{
-            weight + k, inputs, outputs, slope, dy, x + at, dx + at});
+            weight + k, inputs, outputs, slope, rows.dy, rows.x + at, rows.dx + at});
     }
 }
 

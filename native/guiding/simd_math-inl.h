@@ -52,19 +52,6 @@ PHAROS_SIMD_INLINE F abs(const F& x) {
     return bit_cast<F>(bit_cast<IntOf<F>>(x) & 0x7fffffff);
 }
 
-template <class F>
-PHAROS_SIMD_INLINE F sqrt(const F& x) {
-    if constexpr (std::is_same_v<F, float>) {
-        return __builtin_sqrtf(x);
-    } else {
-        F result = x;
-        for (std::size_t i = 0; i < sizeof(F) / sizeof(float); ++i) {
-            result[i] = __builtin_sqrtf(x[i]);
-        }
-        return result;
-    }
-}
-
 // 1 / sqrt(x) for normal x > 0: the exponent halved on the bits, then three Newton steps. Cheaper
 // than a square root and a division on every machine of today.
 template <class F>
@@ -74,6 +61,12 @@ PHAROS_SIMD_INLINE F rsqrt(const F& x) {
     y = y * (1.5f - half * y * y);
     y = y * (1.5f - half * y * y);
     return y + y * (0.5f - half * y * y);
+}
+
+// 0 <= x < 1e38; a few units in the last place.
+template <class F>
+PHAROS_SIMD_INLINE F sqrt(const F& x) {
+    return x * rsqrt<F>(x);
 }
 
 // Nearest integer to |x| < 2^22, as float and as int: adding 1.5 * 2^23 leaves no room for a

@@ -2,6 +2,7 @@
 // attacks, and its file is what it says.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <vector>
@@ -298,7 +299,9 @@ TEST(Field, AttacksLeaveItFinite) {
     for (const GuidingConfig& config : {GuidingConfig::neural(), GuidingConfig::slides()}) {
         for (const Attack& attack : attacks) {
             GuidingField field(config, unit_box());
-            for (std::uint64_t pass = 0; pass < 6; ++pass) {
+            // PHAROS_LONG_TESTS=1: more than 10 000 steps each.
+            const std::uint64_t passes = std::getenv("PHAROS_LONG_TESTS") != nullptr ? 2600 : 6;
+            for (std::uint64_t pass = 0; pass < passes; ++pass) {
                 auto records = record_pass(field, two_lights, 2048, pass + 1);
                 for (std::size_t i = 0; i < records.size(); ++i) {
                     attack(records[i], i);
