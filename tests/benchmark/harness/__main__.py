@@ -112,6 +112,9 @@ def main(arguments):
 
     rows, missing = measure(scenes, picked, plan, options.threads, say)
     report.write_csv(rows, options.out)
+    if not any(row["engine"] == baseline for row in rows):
+        print(f"{baseline} gave no picture to compare with", file=sys.stderr)
+        return 1
     for samples in str(options.at or defaults["at"]).split(","):
         print("\n".join(report.compare(rows, scenes, list(picked), baseline, int(samples))), "\n")
     print("\n".join(report.work_lines(rows, scenes, list(picked))))

@@ -6,12 +6,13 @@
 import os
 import sys
 
-import addon_utils
 import bpy
 
 
 def main():
     blend, out, width, height, bounces = sys.argv[1:6]
+    import addon_utils  # on the path only once bpy is there
+
     bpy.ops.wm.open_mainfile(filepath=blend)
     if addon_utils.enable("pharos", default_set=False) is None:
         raise RuntimeError("the add-on could not be enabled; is BLENDER_USER_SCRIPTS right?")
