@@ -17,6 +17,7 @@ bool shines(const EnvironmentLight* environment) {
 LightBound bound_environment(const EnvironmentLight& environment) {
     LightBound bound;
     bound.distance = EmitterDistance::Ambient;
+    bound.center = Vec3(0.0f, 0.0f, 1.0f);  // any unit direction: at distance 1, as a sun is
     bound.strength = kPi * average(glm::abs(environment.mean_radiance()));
     return bound;
 }

@@ -32,7 +32,7 @@ TEST(ClosedForm, EmittingBox) {
                                  diffuse_emission_program(Rgb(static_cast<float>(kAlbedo)),
                                                           Rgb(static_cast<float>(kEmitted))));
             builder.object(box_mesh("box", Vec3(-1, -2, -1.5f), Vec3(1.5f, 1, 1), true), material);
-            builder.camera(Vec3(0.2f, 0, 0), Vec3(1, 0.3f, 0.2f), 1.2f, 48, 32);
+            builder.camera(Vec3(0.2f, 0, 0), Vec3(1, 0.3f, 0.2f), 1.2f, 32, 24);
             SceneDescription description = with_samples(builder, 256);
             description.settings.use_nee = nee;
             description.settings.max_bounces = max_bounces;
@@ -82,7 +82,7 @@ TEST(ClosedForm, DielectricSlab) {
     builder.object(box_mesh("pane", Vec3(-50, -50, 0), Vec3(50, 50, 0.1f)), glass);
     builder.object(quad_mesh("panel", Vec3(-50, -50, -1), Vec3(100, 0, 0), Vec3(0, 100, 0)), light);
     builder.camera(Vec3(0, 0, 5), Vec3(0, 0, 0), 0.01f, 32, 32);
-    SceneDescription description = with_samples(builder, 4096);
+    SceneDescription description = with_samples(builder, 2048);
     description.settings.max_bounces = 64;
     description.settings.transmission_bounces = 64;
     description.settings.glossy_bounces = 64;
@@ -109,6 +109,20 @@ TEST(ClosedForm, WhitePlaneUnderWhiteSky) {
         EXPECT_NEAR(result.mean(1) / 0.5, 1.0, 2e-3);
         EXPECT_NEAR(result.mean(2) / 0.3, 1.0, 2e-3);
     }
+}
+
+// A sky beside a lamp takes no more than its share of the samples: sun and sky add up at low noise.
+TEST(ClosedForm, SkyAndSunShareTheSamples) {
+    SceneBuilder builder;
+    const auto white = builder.material("white", diffuse_program(Rgb(1.0f)));
+    builder.object(quad_mesh("plane", Vec3(-100, -100, 0), Vec3(200, 0, 0), Vec3(0, 200, 0)),
+                   white);
+    builder.world(background_program(Rgb(1.0f), 0.5f));
+    builder.lamp(sun_lamp(look_at(Vec3(0, 0, 5), Vec3(0)), Rgb(3.0f), 0.0f));
+    builder.camera(Vec3(0, 0, 3), Vec3(0), 0.6f, 32, 32);
+    const Rendered result = render(with_samples(builder, 64));
+    EXPECT_NEAR(result.mean(0) / (0.5 + 3.0 / static_cast<double>(kPi)), 1.0, 5e-3);
+    EXPECT_LT(result.progress.noise, 0.15);
 }
 
 // Light passes a half-transparent pane on its way to the floor, by shadow ray and by chance alike.
