@@ -107,11 +107,11 @@ suite_format() {
 
 suite_native() {
     build_or_fail release all || return
-    run_ctest native 900 release
+    run_ctest native 720 release
 }
 
 suite_blender() {
-    counted blender 1500 /usr/bin/python3 "$PHAROS_ROOT/tests/blender/run_all.py"
+    counted blender 1200 /usr/bin/python3 "$PHAROS_ROOT/tests/blender/run_all.py"
 }
 
 suite_render() {
@@ -120,7 +120,7 @@ suite_render() {
 
 suite_tidy() {
     build_or_fail release all || return
-    counted tidy 1500 "$PYTHON" "$PHAROS_ROOT/tests/tidy.py" --budget "${PHAROS_TIDY_SECONDS:-600}" \
+    counted tidy 1000 "$PYTHON" "$PHAROS_ROOT/tests/tidy.py" --budget "${PHAROS_TIDY_SECONDS:-420}" \
         --cache "$PHAROS_CACHE/tidy"
 }
 
@@ -133,7 +133,7 @@ suite_asan() {
     ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1 \
         LSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/leaks.txt:print_suppressions=0 \
         UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest asan 900 asan -E "$STATISTICAL"
+        run_ctest asan 720 asan -E "$STATISTICAL"
 }
 
 suite_tsan() {
@@ -143,5 +143,5 @@ suite_tsan() {
     done
     build_or_fail tsan "${targets[@]}" || return
     TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \
-        run_ctest tsan 900 tsan -R '^(core|film|integrator|session)\.' -E "$STATISTICAL"
+        run_ctest tsan 480 tsan -R '^(core|film|integrator|session)\.' -E "$STATISTICAL"
 }
