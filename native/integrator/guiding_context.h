@@ -15,7 +15,7 @@ namespace pharos {
 struct GuidingContext {
     const GuidingField* field = nullptr;        // null: the field has nothing to say yet
     const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
-    float fixed_share = 0.0f;
+    float fixed_share = 0.0f;                   // the least share, where there is a selection
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;
     float record_probability = 0.0f;  // of a camera sample

@@ -13,6 +13,15 @@ namespace {
 constexpr double kRecordsPerPass = 32768.0;
 constexpr float kFirstRecordProbability = 0.1f;
 constexpr float kSlidesShare = 0.5f;
+
+// A scene whose paths differ from their pixels by this much (relative variance) is hard: paths that
+// find the light are too rare to prove the guide's worth from records of unguided paths. There the
+// guide serves everywhere at once, as long as the second moments measured under it do not speak
+// against it.
+constexpr double kHardVariance = 4.0;
+constexpr float kHardShare = 0.5f;
+constexpr std::uint32_t kHardTrialPasses = 12;
+constexpr double kHardMaxMomentRatio = 0.97;
 constexpr std::uint32_t kProbingPasses = 8;
 constexpr std::uint32_t kEstimateEveryPass = 16;  // then every fourth
 constexpr int kBlurRadius = 3;
@@ -87,6 +96,7 @@ GuidingContext GuideController::next_pass() const {
         return context;
     }
     context.selection = &*selection_;
+    context.fixed_share = hard_ ? kHardShare : 0.0f;
     context.probe = true;
     const auto patience = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(kPathsBeforeRoulette / std::max<std::uint64_t>(1, pixels_),
@@ -118,11 +128,12 @@ void GuideController::learn(RecordBuffer records,
                                               static_cast<double>(records.recorded_paths)
                                         : 0.0;
         const SelectionStatistics selected = selection_->update(records.selection, counted);
-        status_.guided_share = selected.guided_share;
+        judge_hardness(counted.relative_variance, selected.moment_ratio);
+        status_.guided_share = hard_ ? 1.0 : selected.guided_share;
         status_.moment_ratio = selected.moment_ratio;
-        status_.closed = selected.closed;
+        status_.closed = selected.closed && !hard_;
         if (pass_ >= kProbingPasses) {
-            wanted *= std::clamp(4.0 * selected.guided_share, 1.0 / 16.0, 1.0);
+            wanted *= std::clamp(4.0 * status_.guided_share, 1.0 / 16.0, 1.0);
         }
     } else {
         status_.guided_share = 1.0;
@@ -135,6 +146,14 @@ void GuideController::learn(RecordBuffer records,
         update_pixel_estimate(film);
     }
     ++pass_;
+}
+
+void GuideController::judge_hardness(double relative_variance, double moment_ratio) {
+    if (pass_ == 1) {
+        hard_ = relative_variance > kHardVariance;
+    } else if (pass_ >= kHardTrialPasses && moment_ratio > kHardMaxMomentRatio) {
+        hard_ = false;
+    }
 }
 
 void GuideController::update_pixel_estimate(const Film& film) {

@@ -36,12 +36,14 @@ class GuideController {
     [[nodiscard]] const GuideStatus& status() const { return status_; }
 
   private:
+    void judge_hardness(double relative_variance, double moment_ratio);
     void update_pixel_estimate(const Film& film);
 
     GuidingMode mode_;
     bool enabled_;
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
+    bool hard_ = false;
     float record_probability_;
     std::optional<GuidingField> field_;
     std::optional<GuideSelection> selection_;

@@ -117,9 +117,11 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
         return;
     }
     const SurfaceInteraction& surface = batch.surfaces[s];
-    guide.share = guiding.selection != nullptr
-                      ? guiding.selection->alpha(surface.p, surface.ns, glossy)
-                      : guiding.fixed_share;
+    guide.share = guiding.fixed_share;
+    if (guiding.selection != nullptr) {
+        guide.share =
+            std::max(guide.share, guiding.selection->alpha(surface.p, surface.ns, glossy));
+    }
     if (guide.share > 0.0f || (recorded && guiding.probe)) {
         queue_query(s, batch);
     }
