@@ -20,16 +20,23 @@ constexpr std::array<float, kShares> kShare = {0.0f, 0.25f, 0.5f, 0.75f};
 constexpr double kDecay = 0.9;         // of all sums, a pass
 constexpr double kPriorCount = 128.0;  // weight of the parent in a cell's mean, and so on up
 constexpr double kMaxMoment = 50.0;    // of one record, in units of the picture's variance
-constexpr double kGuideCost = 200.0;   // counted work: of a guided vertex, beyond
-constexpr double kVertexCost = 600.0;  // that of any vertex
-constexpr double kCostShare = 0.7;     // how much of its cost a cell's gain must repay
-constexpr double kStay = 0.8;          // hysteresis: a cell that is on stays on with less,
-constexpr double kEnter = 1.2;         // and one that is off needs more
-constexpr double kConfidence = 0.5;    // standard errors taken off the gain before it counts
-constexpr double kKeepShare = 1.03;    // another share must be this much better
-constexpr double kOverrideOn = 0.45;   // guided everywhere once so many vertices are in on-cells
-constexpr double kOverrideOff = 0.3;
-constexpr double kGateShare = 0.12;       // nearly nothing is on: the whole machinery closes
+// Counted work, in the proportion that whole renders showed: of a guided vertex beyond that of any
+// (inference, two more densities, its records and their training), and of any vertex.
+constexpr double kGuideCost = 500.0;
+constexpr double kVertexCost = 900.0;
+constexpr double kStay = 0.8;        // hysteresis: a cell that is on stays on with less,
+constexpr double kEnter = 1.2;       // and one that is off needs more
+constexpr double kConfidence = 0.5;  // standard errors taken off the gain before it counts
+constexpr double kKeepShare = 1.03;  // another share must be this much better
+// Guided everywhere once so many vertices are in on-cells, and no longer when it is fewer by a
+// third. The more a path varies, the more the weight window adds to what the moments can see
+// (prototype: a factor of two on noisy scenes, a loss on quiet ones): above a relative variance of
+// 2 it takes fewer.
+constexpr double kOverrideShare = 0.45;
+constexpr double kOverrideStay = 2.0 / 3.0;
+constexpr double kQuietVariance = 2.0;
+// Nearly nothing is on: the whole machinery closes (with fewer where it is noisy, likewise).
+constexpr double kGateShare = 0.12;
 constexpr std::uint32_t kGatePasses = 9;  // after so many judged passes
 constexpr std::uint32_t kProbeEvery = 64;
 constexpr std::uint32_t kProbePasses = 2;
@@ -188,6 +195,7 @@ struct GuideSelection::Impl {
     double variance_count = 0.0;
     std::uint32_t judged_passes = 0;
     std::uint32_t closed_passes = 0;
+    double noise_factor = 1.0;
     bool override_on = false;
     bool closed = false;
     std::uint32_t gate_at = kGatePasses;
@@ -198,7 +206,7 @@ struct GuideSelection::Impl {
     void fold_pass(double variance);
     void decide_parents(double threshold);
     void decide_cells(double threshold);
-    SelectionStatistics publish();
+    SelectionStatistics publish(double variance);
     void update_gate(const SelectionStatistics& statistics);
 };
 
@@ -338,7 +346,7 @@ void GuideSelection::Impl::decide_cells(double threshold) {
     }
 }
 
-SelectionStatistics GuideSelection::Impl::publish() {
+SelectionStatistics GuideSelection::Impl::publish(double variance) {
     SelectionStatistics statistics;
     // Counts are decayed whole numbers; the order of cells is not fixed, so the sums are rounded
     // ones.
@@ -352,7 +360,10 @@ SelectionStatistics GuideSelection::Impl::publish() {
     }
     statistics.cells = static_cast<std::uint32_t>(cells.size());
     const double on_share = all > 0 ? static_cast<double>(on) / static_cast<double>(all) : 0.0;
-    override_on = on_share > (override_on ? kOverrideOff : kOverrideOn);
+    // A picture that has become quiet through guiding is still judged as the noisy one it was.
+    noise_factor = std::min(noise_factor, kQuietVariance / std::max(variance, kQuietVariance));
+    const double enough = kOverrideShare * noise_factor;
+    override_on = on_share > (override_on ? kOverrideStay * enough : enough);
     statistics.guided_share = override_on ? 1.0 : on_share;
     double best = 1.0;
     for (std::size_t a = 1; a < kShares && global.moment[0] > 0.0; ++a) {
@@ -364,7 +375,7 @@ SelectionStatistics GuideSelection::Impl::publish() {
 
 // Closes when nearly nothing is on; opens again for two passes in 64 that it is told of.
 void GuideSelection::Impl::update_gate(const SelectionStatistics& statistics) {
-    if (judged_passes >= gate_at && statistics.guided_share < kGateShare) {
+    if (judged_passes >= gate_at && statistics.guided_share < kGateShare * noise_factor) {
         closed = true;
         closed_passes = 0;
     }
@@ -413,11 +424,10 @@ SelectionStatistics GuideSelection::update(std::span<const SelectionRecord> reco
         s.fold_pass(variance);
         ++s.judged_passes;
         const double path_cost = pass.vertices / pass.paths * kVertexCost;
-        const double threshold =
-            kCostShare * variance * kGuideCost / std::max(path_cost, kVertexCost);
+        const double threshold = variance * kGuideCost / std::max(path_cost, kVertexCost);
         s.decide_parents(threshold);
         s.decide_cells(threshold);
-        statistics = s.publish();
+        statistics = s.publish(variance);
         s.update_gate(statistics);
     }
     statistics.closed = s.closed;

@@ -44,7 +44,7 @@ SelectionRecord peaked_record(Random& random, const Vec3& position, bool good, f
 }
 
 SelectionPass work() {
-    return {4096.0, 16384.0, 4.0};
+    return {4096.0, 16384.0, 1.5};
 }
 
 TEST(Selection, TurnsOnWhereTheGuideWinsAndStaysOffWhereItLoses) {
@@ -124,6 +124,28 @@ TEST(Selection, EverywhereOnceMostIsOn) {
         selection.update(records, work());
     }
     EXPECT_GE(selection.alpha(never_seen, Vec3(1, 0, 0), true), 0.25f);
+}
+
+// Where paths vary much, the weight window adds to the gain: fewer on-cells are enough.
+TEST(Selection, NoisyPicturesTurnOnEarlier) {
+    for (const double variance : {1.5, 30.0}) {
+        GuideSelection selection(unit_box());
+        Random random(7);
+        SelectionStatistics statistics;
+        for (int pass = 0; pass < 6; ++pass) {
+            std::vector<SelectionRecord> records;
+            for (int i = 0; i < 3000; ++i) {
+                SelectionRecord r =
+                    peaked_record(random, i % 10 == 0 ? Vec3(0.1f) : Vec3(0.9f), i % 10 == 0, 0.0f);
+                r.weight *= static_cast<float>(variance);
+                records.push_back(r);
+            }
+            statistics = selection.update(records, {4096.0, 16384.0, variance});
+        }
+        const bool everywhere = selection.alpha(Vec3(0.9f), Vec3(0, 0, 1), false) > 0.0f;
+        EXPECT_EQ(everywhere, variance > 10.0) << variance;
+        EXPECT_NEAR(statistics.guided_share, everywhere ? 1.0 : 0.1, 0.05);
+    }
 }
 
 TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
