@@ -21,7 +21,7 @@ SceneDescription with_samples(SceneBuilder& builder, std::uint32_t samples) {
 
 // Inside a closed box that emits e everywhere and reflects a: L = e (1 - a^(n+1)) / (1 - a) after n
 // scatterings, whichever way the light is sampled.
-TEST(ClosedForm, EmittingBox) {
+TEST(ClosedFormStatistics, EmittingBox) {
     constexpr double kEmitted = 0.5;
     constexpr double kAlbedo = 0.5;
     for (const bool nee : {true, false}) {
@@ -50,7 +50,7 @@ TEST(ClosedForm, EmittingBox) {
 }
 
 // A white object in a white world is invisible, lobe by lobe (those that lose no energy).
-TEST(ClosedForm, WhiteFurnace) {
+TEST(ClosedFormStatistics, WhiteFurnace) {
     const std::vector<std::pair<const char*, NodeProgram>> lobes{
         {"diffuse", diffuse_program(Rgb(1.0f))},
         {"mirror", glossy_program(Rgb(1.0f), 0.0f)},
@@ -75,7 +75,7 @@ TEST(ClosedForm, WhiteFurnace) {
 }
 
 // A pane of index 1.5 seen head-on passes (1 - R) / (1 + R) of what is behind it, R = 0.04.
-TEST(ClosedForm, DielectricSlab) {
+TEST(ClosedFormStatistics, DielectricSlab) {
     SceneBuilder builder;
     const auto glass = builder.material("glass", glass_program(Rgb(1.0f), 0.0f, 1.5f));
     const auto light = builder.material("light", emission_program(Rgb(1.0f), 1.0f));
@@ -91,7 +91,7 @@ TEST(ClosedForm, DielectricSlab) {
 }
 
 // A plane under a uniform sky, and the pixel filter sums to one on a flat picture.
-TEST(ClosedForm, WhitePlaneUnderWhiteSky) {
+TEST(ClosedFormStatistics, WhitePlaneUnderWhiteSky) {
     for (const PixelFilter filter :
          {PixelFilter::Box, PixelFilter::Gaussian, PixelFilter::BlackmanHarris}) {
         SceneBuilder builder;
@@ -112,7 +112,7 @@ TEST(ClosedForm, WhitePlaneUnderWhiteSky) {
 }
 
 // A sky beside a lamp takes no more than its share of the samples: sun and sky add up at low noise.
-TEST(ClosedForm, SkyAndSunShareTheSamples) {
+TEST(ClosedFormStatistics, SkyAndSunShareTheSamples) {
     SceneBuilder builder;
     const auto white = builder.material("white", diffuse_program(Rgb(1.0f)));
     builder.object(quad_mesh("plane", Vec3(-100, -100, 0), Vec3(200, 0, 0), Vec3(0, 200, 0)),
@@ -126,7 +126,7 @@ TEST(ClosedForm, SkyAndSunShareTheSamples) {
 }
 
 // Light passes a half-transparent pane on its way to the floor, by shadow ray and by chance alike.
-TEST(ClosedForm, TransparentShadow) {
+TEST(ClosedFormStatistics, TransparentShadow) {
     for (const bool nee : {true, false}) {
         SceneBuilder builder;
         const auto white = builder.material("white", diffuse_program(Rgb(1.0f)));

@@ -76,7 +76,7 @@ GuidingField poisoned_field(const Bounds3& box, const Vec3& direction, ThreadPoo
     return field;
 }
 
-TEST(Guided, PoisonedGuideKeepsTheClosedForm) {
+TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
     ThreadPool pool(2);
     for (const bool nee : {true, false}) {
         SceneDescription description = emitting_box(32, 24);
@@ -110,7 +110,7 @@ TEST(Guided, PoisonedGuideKeepsTheClosedForm) {
     }
 }
 
-TEST(Guided, LearningKeepsTheClosedForm) {
+TEST(GuidedStatistics, LearningKeepsTheClosedForm) {
     for (const GuidingMode mode : {GuidingMode::Neural, GuidingMode::Slides}) {
         SceneDescription description = emitting_box(48, 32);
         description.settings.guiding = mode;
@@ -143,7 +143,7 @@ TEST(Guided, IsBitEqualForAnyNumberOfThreads) {
 }
 
 // The same mean with and without the guide, and less noise with it where light is hard to find.
-TEST(Guided, AgreesWithUnguidedAndIsLessNoisy) {
+TEST(GuidedStatistics, AgreesWithUnguidedAndIsLessNoisy) {
     SceneDescription unguided = two_rooms(48, 36, 128);
     SceneDescription guided = unguided;
     guided.settings.guiding = GuidingMode::Neural;

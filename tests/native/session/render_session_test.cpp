@@ -59,7 +59,7 @@ TEST(RenderSession, IsBitEqualForAnyNumberOfThreads) {
     }
 }
 
-TEST(RenderSession, SeedsDifferAndAgreeInTheMean) {
+TEST(RenderSessionStatistics, SeedsDifferAndAgreeInTheMean) {
     SceneDescription first = room(40, 30, 64);
     SceneDescription second = first;
     second.settings.seed = 7;
@@ -86,7 +86,7 @@ TEST(RenderSession, BorderEqualsTheFullFrame) {
     }
 }
 
-TEST(RenderSession, NeeAndPlainPathTracingAgree) {
+TEST(RenderSessionStatistics, NeeAndPlainPathTracingAgree) {
     SceneDescription with = room(32, 24, 256);
     SceneDescription without = with;
     without.settings.use_nee = false;
