@@ -81,6 +81,15 @@ def _named_output(code: str, enumeration: str, sizes: dict):
     return handler
 
 
+_light_path_output = _named_output("LightPath", "LightPathOutput", {})
+
+
+def _light_path(f, node, scope, socket):
+    """The renderer does not tell programs how a path came: every hit is a camera ray's."""
+    f.unsupported(node, "telling kinds of rays apart (all count as camera rays)")
+    return _light_path_output(f, node, scope, socket)
+
+
 def _object_info(f, node, scope, socket):
     modes = f.native.ObjectInfoOutput
     if socket.identifier not in modes:
@@ -421,7 +430,7 @@ VALUES = {
     "ShaderNodeNewGeometry": _geometry,
     "ShaderNodeObjectInfo": _object_info,
     "ShaderNodeCameraData": _named_output("CameraData", "CameraDataOutput", {"ViewVector": 3}),
-    "ShaderNodeLightPath": _named_output("LightPath", "LightPathOutput", {}),
+    "ShaderNodeLightPath": _light_path,
     "ShaderNodeAttribute": _attribute,
     "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment,
