@@ -11,7 +11,7 @@ import numpy as np
 
 from harness import engines
 
-CHUNK = 1024
+CHUNK = 256  # an interrupted series loses no more than this
 SEED_STEP = 1_000_000
 HARD = ("door", "lamp", "veach_ajar", "veach_ajar@128")  # guided references converge sooner here
 
