@@ -43,7 +43,7 @@ struct FieldQuery {
 struct TrainStatistics {
     std::uint64_t records = 0;          // given
     std::uint64_t invalid_records = 0;  // non-finite or negative values, pdf not positive: dropped
-    std::uint64_t trained_records = 0;  // after thinning of zeros and the held-out share
+    std::uint64_t trained_records = 0;  // visits, after thinning of zeros and the held-out share
     std::uint32_t steps = 0;
     std::uint32_t skipped_steps = 0;    // gradient not finite
     bool published = false;             // this pass' snapshot was not worse on the held-out records

@@ -12,6 +12,13 @@
 
 namespace pharos {
 
+namespace {
+
+constexpr std::size_t kRecordsPerPass = 32768;  // visits wanted
+constexpr std::size_t kMaxEpochs = 4;
+
+}  // namespace
+
 // The pool's threads for the length of one train() call: the caller leads and hands out short
 // tasks, the others poll for them. A helper that the system has paused holds up nobody, since tasks
 // are claimed one by one and the leader takes part.
@@ -134,11 +141,18 @@ void Trainer::train_batches(NetworkState& state, Team& team, TrainStatistics& st
     const std::size_t batch_chunks = workspace_.size();
     const std::size_t chunks = records_.training.chunks();
     double loss = 0.0;
-    for (std::size_t first = 0; first < chunks; first += batch_chunks) {
+    // Few records (most had no light and were thinned) are visited several times: at the start it
+    // is the number of steps that learning waits for.
+    const std::size_t size = std::max<std::size_t>(1, records_.training.size());
+    const std::size_t epochs = std::clamp<std::size_t>(kRecordsPerPass / size, 1, kMaxEpochs);
+    const std::size_t end = epochs * chunks;
+    for (std::size_t visit = 0; visit < end;) {
+        const std::size_t first = visit % chunks;
+        visit += std::min(batch_chunks, chunks - first);
         // A last batch of less than a quarter is too noisy to step on, unless it is all there is.
         const std::size_t count = std::min(batch_chunks, chunks - first);
         if (first > 0 && 4 * count < batch_chunks) {
-            break;
+            continue;
         }
         const bool stepped = train_batch(state, team, first, loss);
         statistics.steps += stepped ? 1 : 0;
