@@ -35,6 +35,7 @@ constexpr double kKeepShare = 1.03;  // another share must be this much better
 constexpr double kOverrideShare = 0.45;
 constexpr double kOverrideStay = 2.0 / 3.0;
 constexpr double kQuietVariance = 2.0;
+constexpr double kMinNoiseFactor = 0.2;  // early variances are those of the pixel estimate as well
 // Nearly nothing is on: the whole machinery closes (with fewer where it is noisy, likewise).
 constexpr double kGateShare = 0.12;
 constexpr std::uint32_t kGatePasses = 9;  // after so many judged passes
@@ -361,7 +362,9 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
     statistics.cells = static_cast<std::uint32_t>(cells.size());
     const double on_share = all > 0 ? static_cast<double>(on) / static_cast<double>(all) : 0.0;
     // A picture that has become quiet through guiding is still judged as the noisy one it was.
-    noise_factor = std::min(noise_factor, kQuietVariance / std::max(variance, kQuietVariance));
+    noise_factor =
+        std::min(noise_factor,
+                 std::max(kQuietVariance / std::max(variance, kQuietVariance), kMinNoiseFactor));
     const double enough = kOverrideShare * noise_factor;
     override_on = on_share > (override_on ? kOverrideStay * enough : enough);
     statistics.guided_share = override_on ? 1.0 : on_share;
