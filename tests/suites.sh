@@ -130,7 +130,7 @@ STATISTICAL='ChiSquare|chi_square|Statistic|Random.*Bound|Long'
 
 suite_asan() {
     build_or_fail asan native_tests || return
-    ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1 \
+    ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:fast_unwind_on_malloc=0:malloc_context_size=12 \
         LSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/leaks.txt:print_suppressions=0 \
         UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest asan 720 asan -E "$STATISTICAL"
