@@ -23,6 +23,11 @@ class Camera {
     // Distance of p from the camera's plane along its axis.
     [[nodiscard]] float depth(const Vec3& p) const { return glm::dot(p - origin_, forward_); }
 
+    // Distance of p from the camera: from its centre, of an orthographic one from its plane.
+    [[nodiscard]] float distance(const Vec3& p) const {
+        return type_ == CameraType::Perspective ? glm::distance(p, origin_) : std::abs(depth(p));
+    }
+
     [[nodiscard]] Mat4 world_to_camera() const;  // x right, y up, looking along -z
 
   private:

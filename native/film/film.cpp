@@ -14,22 +14,12 @@ constexpr std::size_t kAux = 9;  // normal, guide normal, albedo
 
 }  // namespace
 
-int film_pass_channels(FilmPass pass) {
-    switch (pass) {
-        case FilmPass::Combined:
-            return 4;
-        case FilmPass::Depth:
-        case FilmPass::SampleCount:
-            return 1;
-        default:
-            return 3;
-    }
-}
-
-Film::Film(const FilmDescription& description)
+Film::Film(const FilmDescription& description, const PassLayout& passes)
     : width_(description.crop_width),
       height_(description.crop_height),
-      exposure_(description.exposure) {
+      exposure_(description.exposure),
+      passes_(passes),
+      from_first_(passes.sample_size()) {
     const std::size_t pixels = std::size_t{width_} * height_;
     sum_.resize(pixels * 4);
     half_sum_.resize(pixels * 3);
@@ -38,6 +28,56 @@ Film::Film(const FilmDescription& description)
     weight_.resize(pixels);
     half_weight_.resize(pixels);
     count_.resize(pixels);
+    blocks_.resize(pixels * passes_.size());
+    for (std::size_t i = 0; i < kFilmPasses; ++i) {
+        const auto pass = static_cast<FilmPass>(i);
+        if (passes_.wants(pass) && film_pass_info(pass).kind == PassKind::FirstSample) {
+            const auto begin = from_first_.begin() + passes_.offset(pass);
+            std::fill(begin, begin + film_pass_channels(pass), true);
+        }
+    }
+}
+
+void Film::add_passes(std::uint32_t pixel, std::span<const float> values, double weight) {
+    DCHECK(values.size() == passes_.sample_size());
+    double* block = &blocks_[std::size_t{pixel} * passes_.size()];
+    const bool first = count_[pixel] == 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const auto value = static_cast<double>(values[i]);
+        if (!from_first_[i]) {
+            block[i] += weight * value;
+        } else if (first) {
+            block[i] = value;
+        }
+    }
+}
+
+void Film::set_pass(FilmPass pass, std::uint32_t pixel, std::span<const float> values) {
+    CHECK(passes_.wants(pass) && film_pass_info(pass).kind == PassKind::AtTheEnd);
+    std::ranges::copy(
+        values,
+        blocks_.begin() + static_cast<std::ptrdiff_t>(std::size_t{pixel} * passes_.size() +
+                                                      passes_.offset(pass)));
+}
+
+void Film::read_on_request(FilmPass pass, std::span<float> out) const {
+    CHECK(passes_.wants(pass));
+    const auto channels = static_cast<std::size_t>(film_pass_channels(pass));
+    const FilmPassInfo& info = film_pass_info(pass);
+    for (std::size_t i = 0; i < weight_.size(); ++i) {
+        const double* block = &blocks_[i * passes_.size() + passes_.offset(pass)];
+        double scale = info.exposed ? static_cast<double>(exposure_) : 1.0;
+        if (info.kind == PassKind::Average) {
+            scale *= weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
+        }
+        for (std::size_t c = 0; c < channels; ++c) {
+            out[i * channels + c] = static_cast<float>(block[c] * scale);
+        }
+        if (pass == FilmPass::Mist) {
+            // Paths write how clearly the surface shows.
+            out[i] = std::clamp(1.0f - out[i], 0.0f, 1.0f);
+        }
+    }
 }
 
 void Film::add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even) {
@@ -67,6 +107,10 @@ void Film::read(FilmPass pass, std::span<float> out) const {
     const std::size_t pixels = weight_.size();
     const auto channels = static_cast<std::size_t>(film_pass_channels(pass));
     CHECK_EQ(out.size(), pixels * channels);
+    if (film_pass_info(pass).kind != PassKind::Basic) {
+        read_on_request(pass, out);
+        return;
+    }
     if (pass == FilmPass::Depth) {
         std::copy(depth_.begin(), depth_.end(), out.begin());
         return;
@@ -122,6 +166,7 @@ void Film::clear() {
     std::ranges::fill(sum_, 0.0);
     std::ranges::fill(half_sum_, 0.0);
     std::ranges::fill(aux_, 0.0);
+    std::ranges::fill(blocks_, 0.0);
     std::ranges::fill(depth_, kBackgroundDepth);
     std::ranges::fill(weight_, 0.0);
     std::ranges::fill(half_weight_, 0.0);

@@ -3,7 +3,7 @@
 // A batch of paths owns its pixels, so adding needs no lock. Every pass of samples has a weight
 // fixed by its number; a pixel's value is the weighted sum over the sum of weights. Half of the
 // passes also go to a second sum, from whose difference the noise of the picture is estimated.
-// Coordinates are those of the rendered window, row 0 at the bottom.
+// Coordinates are those of the rendered window, row 0 at the bottom. Passes on request: passes.h.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 
 #include "core/math.h"
 #include "film/film_description.h"
+#include "film/passes.h"
 
 namespace pharos {
 
@@ -26,20 +27,9 @@ struct FilmSample {
     float depth = 1e10f;      // first hit along the camera's axis; 1e10 where nothing was hit
 };
 
-enum class FilmPass : std::uint8_t {
-    Combined,
-    Depth,
-    Normal,
-    DenoisingNormal,
-    DenoisingAlbedo,
-    SampleCount
-};
-
-[[nodiscard]] int film_pass_channels(FilmPass pass);  // 4, 1, 3, 3, 3, 1
-
 class Film {
   public:
-    explicit Film(const FilmDescription& description);
+    explicit Film(const FilmDescription& description, const PassLayout& passes = PassLayout());
 
     [[nodiscard]] std::uint32_t width() const { return width_; }
 
@@ -49,7 +39,21 @@ class Film {
     // must have been dropped by the caller (and counted): DCHECKed here.
     void add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even);
 
-    // Writes width * height * channels floats; a pixel without samples is 0 (depth: 1e10).
+    // Adds what a sample says of the passes on request: passes().sample_size() floats. To be called
+    // before add() of the same sample.
+    void add_passes(std::uint32_t pixel, std::span<const float> values, double weight);
+
+    // Sets a pixel of a wanted pass of the kind AtTheEnd.
+    void set_pass(FilmPass pass, std::uint32_t pixel, std::span<const float> values);
+
+    [[nodiscard]] const PassLayout& passes() const { return passes_; }
+
+    [[nodiscard]] bool has(FilmPass pass) const {
+        return film_pass_info(pass).kind == PassKind::Basic || passes_.wants(pass);
+    }
+
+    // Writes width * height * channels floats of a pass that the film has; a pixel without samples
+    // is 0 (depth: 1e10, mist: 1).
     void read(FilmPass pass, std::span<float> out) const;
 
     // Relative standard error of the picture, from the two halves; 1 with fewer than two passes.
@@ -58,6 +62,8 @@ class Film {
     void clear();
 
   private:
+    void read_on_request(FilmPass pass, std::span<float> out) const;
+
     std::uint32_t width_;
     std::uint32_t height_;
     float exposure_;
@@ -65,6 +71,9 @@ class Film {
     std::vector<double> half_sum_;  // r g b of even passes
     std::vector<double> aux_;       // normal, guide normal, albedo per pixel
     std::vector<float> depth_;
+    PassLayout passes_;
+    std::vector<bool> from_first_;  // by float of a sample's block
+    std::vector<double> blocks_;    // passes_.size() per pixel
     std::vector<double> weight_;
     std::vector<double> half_weight_;
     std::vector<std::uint32_t> count_;

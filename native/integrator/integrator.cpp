@@ -1,30 +1,26 @@
 #include "integrator/integrator.h"
 
-#include <chrono>
-
-#include "integrator/path_batch.h"
+#include "integrator/integrator_worker.h"
 #include "integrator/stages.h"
 
 namespace pharos {
 
 namespace {
 
-// Large enough for full SIMD groups deep in the path, small enough for a core's L2.
-constexpr std::uint32_t kBatchPaths = 1024;
-
-[[nodiscard]] std::uint64_t nanoseconds() {
-    return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                          std::chrono::steady_clock::now().time_since_epoch())
-                                          .count());
-}
-
-// Runs a stage and books its items and time.
-template <class Function>
-void timed(BatchStatistics& statistics, Stage stage, const Function& function) {
-    const std::uint64_t begin = nanoseconds();
-    StageCounter& counter = statistics[stage];
-    counter.items += function();
-    counter.nanoseconds += nanoseconds() - begin;
+// Adds the passes on request of a batch's samples to the film.
+void add_passes(const PathBatch& batch,
+                const PassLayout& passes,
+                std::uint32_t first_pixel,
+                double weight,
+                Film& film) {
+    const std::size_t size = passes.sample_size();
+    if (size == 0) {
+        return;
+    }
+    for (std::uint32_t root = 0; root < batch.roots; ++root) {
+        film.add_passes(
+            first_pixel + root, std::span(batch.root_passes).subspan(root * size, size), weight);
+    }
 }
 
 }  // namespace
@@ -40,15 +36,10 @@ void BatchStatistics::add(const BatchStatistics& other) {
     nonfinite += other.nonfinite;
 }
 
-struct Integrator::Worker {
-    PathBatch batch{kBatchPaths};
-    BatchStatistics statistics;
-    RecordBuffer records;
-};
-
 Integrator::Integrator(const Scene& scene, ThreadPool& pool)
     : scene_(scene),
       pool_(pool),
+      passes_(scene.description.passes.wanted),
       camera_(
           scene.description.camera, scene.description.film.width, scene.description.film.height),
       filter_(scene.description.film.filter, scene.description.film.filter_width) {
@@ -72,6 +63,7 @@ void Integrator::render_batch(const RenderContext& context,
     timed(statistics, Stage::GenerateCameraRays, [&] {
         return generate_camera_rays(context, work, batch);
     });
+    batch.root_passes.assign(std::size_t{work.pixels} * context.passes.sample_size(), 0.0f);
     statistics.camera_samples += work.pixels;
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
@@ -89,6 +81,7 @@ void Integrator::render_batch(const RenderContext& context,
         timed(statistics, Stage::AddEmittedRadiance, [&] {
             return add_emitted_radiance(context, batch);
         });
+        timed(statistics, Stage::WritePasses, [&] { return write_passes(context, batch); });
         timed(statistics, Stage::QueryGuidingField, [&] {
             return query_guiding_field(context, batch);
         });
@@ -130,7 +123,7 @@ bool Integrator::render_pass(const PassSettings& pass,
                              const GuidingContext& guiding,
                              SharedFilm& film,
                              const StopCondition& stop) {
-    const RenderContext context{scene_, camera_, filter_, pass, guiding};
+    const RenderContext context{scene_, camera_, filter_, pass, guiding, passes_};
     const std::uint32_t pixels = film.film.width() * film.film.height();
     std::atomic<bool> complete{true};
     // A batch is a run of pixels with all of the pass' samples, one after the other.
@@ -147,6 +140,7 @@ bool Integrator::render_pass(const PassSettings& pass,
             render_batch(context, {first, count, sample}, worker);
             timed(worker.statistics, Stage::AccumulateFilm, [&] {
                 const std::shared_lock lock(film.mutex);
+                add_passes(worker.batch, passes_, first, pass.weight, film.film);
                 for (std::uint32_t root = 0; root < count; ++root) {
                     film.film.add(
                         first + root, worker.batch.root_sample[root], pass.weight, sample % 2 == 0);
@@ -156,12 +150,16 @@ bool Integrator::render_pass(const PassSettings& pass,
             film.serial.fetch_add(1, std::memory_order_relaxed);
         }
     });
+    add_up();
+    return complete.load();
+}
+
+void Integrator::add_up() {
     total_ = {};
     for (const auto& worker : workers_) {
         total_.add(worker->statistics);
     }
     total_[Stage::Train] = training_;
-    return complete.load();
 }
 
 }  // namespace pharos

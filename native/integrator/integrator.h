@@ -25,7 +25,8 @@ namespace pharos {
 // A film that a host may read while batches are added: adding takes the lock shared (batches own
 // their pixels), reading takes it alone.
 struct SharedFilm {
-    explicit SharedFilm(const FilmDescription& description) : film(description) {}
+    explicit SharedFilm(const FilmDescription& description, const PassLayout& passes = PassLayout())
+        : film(description, passes) {}
 
     Film film;
     mutable std::shared_mutex mutex;
@@ -53,6 +54,9 @@ class Integrator {
                      SharedFilm& film,
                      const StopCondition& stop);
 
+    // Writes the wanted passes about the guide, as it is now, into the film.
+    void render_guide_passes(const GuidingContext& guiding, SharedFilm& film);
+
     // What the last pass recorded, gathered from all threads (unordered: sort by key).
     [[nodiscard]] RecordBuffer take_records();
 
@@ -69,9 +73,15 @@ class Integrator {
     void render_batch(const RenderContext& context,
                       const struct BatchWork& work,
                       Worker& worker) const;
+    std::uint64_t render_guide_batch(const RenderContext& context,
+                                     std::uint32_t first_pixel,
+                                     Worker& worker,
+                                     SharedFilm& film) const;
+    void add_up();
 
     const Scene& scene_;
     ThreadPool& pool_;
+    PassLayout passes_;
     Camera camera_;
     FilterSampler filter_;
     std::vector<std::unique_ptr<Worker>> workers_;

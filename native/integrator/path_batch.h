@@ -35,6 +35,7 @@ struct PathCounters {
     bool from_camera = true;     // nothing but transparent surfaces since the camera
     bool after_diffuse = false;  // some scattering so far was diffuse (caustics switches)
     bool features_done = false;  // albedo and normal for denoising are taken
+    bool passes_done = false;    // passes of a single surface are taken
 };
 
 // A shadow ray waiting for its answer.
@@ -63,6 +64,7 @@ struct PathBatch {
     // --- roots ---
     std::vector<std::uint32_t> root_pixel;  // in the rendered window
     std::vector<FilmSample> root_sample;
+    std::vector<float> root_passes;  // on request: PassLayout::sample_size() of each
 
     // --- paths ---
     std::vector<std::uint32_t> root;

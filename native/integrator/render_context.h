@@ -7,6 +7,7 @@
 
 #include "camera/camera.h"
 #include "film/filter.h"
+#include "film/passes.h"
 #include "integrator/guiding_context.h"
 #include "scene/scene.h"
 
@@ -25,6 +26,7 @@ struct RenderContext {
     const FilterSampler& filter;
     PassSettings pass;
     GuidingContext guiding;
+    const PassLayout& passes;  // on request
 
     [[nodiscard]] const RenderSettings& settings() const { return scene.description.settings; }
 };
@@ -37,6 +39,7 @@ enum class Stage : std::uint8_t {
     AddEscapedRadiance,
     EvaluateMaterials,
     AddEmittedRadiance,
+    WritePasses,
     QueryGuidingField,
     SampleDirectLight,
     TraceShadowRays,
@@ -54,6 +57,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Stage::Co
     "add_escaped_radiance",
     "evaluate_materials",
     "add_emitted_radiance",
+    "write_passes",
     "query_guiding_field",
     "sample_direct_light",
     "trace_shadow_rays",

@@ -39,6 +39,9 @@ std::uint64_t evaluate_materials(const RenderContext& context, PathBatch& batch)
 // Emission of surfaces hit by chance, weighted against next-event estimation.
 std::uint64_t add_emitted_radiance(const RenderContext& context, PathBatch& batch);
 
+// Passes on request: what the camera sees directly. Skipped where none is wanted.
+std::uint64_t write_passes(const RenderContext& context, PathBatch& batch);
+
 // One inference for all vertices that the guide serves or that are recorded.
 std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch);
 

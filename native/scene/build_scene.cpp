@@ -4,6 +4,7 @@
 #include "camera/camera.h"
 #include "core/fp_state.h"
 #include "core/parallel.h"
+#include "film/passes.h"
 #include "image/image_io.h"
 #include "scene/mend.h"
 #include "scene/scene.h"
@@ -85,10 +86,15 @@ void SceneBuild::mend() {
         mend_mesh(mesh, cancel_, report_);
     }
     const auto default_material = static_cast<std::uint32_t>(d.materials.size());
-    for (const InstanceDescription& instance : d.instances) {
-        auto mended = mend_instance(d, instance, default_material, report_);
+    const bool wants_index = (d.passes.wanted & pass_bit(FilmPass::ObjectIndex)) != 0;
+    for (std::size_t i = 0; i < d.instances.size(); ++i) {
+        auto mended = mend_instance(d, d.instances[i], default_material, report_);
         if (mended && !d.meshes[mended->mesh].triangles.empty()) {
             scene_->instances.push_back(std::move(*mended));
+            if (wants_index) {
+                const auto& indices = d.passes.object_indices;
+                scene_->pass_index.push_back(i < indices.size() ? indices[i] : 0);
+            }
         }
     }
     scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances);

@@ -18,12 +18,11 @@ namespace pharos {
 namespace {
 
 constexpr std::array<char, 8> kMagic = {'P', 'H', 'A', 'R', 'O', 'S', '\x1a', '\n'};
-constexpr std::uint32_t kVersion = 1;
 constexpr std::uint32_t kByteOrder = 0x01020304;
 
 struct Header {
     std::array<char, 8> magic = kMagic;
-    std::uint32_t version = kVersion;
+    std::uint32_t version = dump::kVersion;
     std::uint32_t byte_order = kByteOrder;
     std::uint64_t payload_size = 0;
     std::uint64_t checksum = 0;  // of the payload
@@ -57,7 +56,7 @@ void check_header(const Header& header, std::uint64_t payload_size) {
     if (header.magic != kMagic || header.byte_order != kByteOrder) {
         throw std::runtime_error("not a Pharos scene dump");
     }
-    if (header.version != kVersion) {
+    if (header.version < dump::kOldestVersion || header.version > dump::kVersion) {
         throw std::runtime_error("version " + std::to_string(header.version) +
                                  " of the format is not supported");
     }
@@ -73,7 +72,7 @@ SceneDescription parse(const Header& header, std::span<const std::uint8_t> paylo
         throw std::runtime_error("damaged: the checksum does not fit");
     }
     SceneDescription description;
-    dump::Reader reader(payload);
+    dump::Reader reader(payload, header.version);
     reader(description);
     if (reader.remaining() != 0) {
         throw std::runtime_error("damaged: too long");

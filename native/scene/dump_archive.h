@@ -30,10 +30,15 @@ inline constexpr bool kPlain =
     std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> || std::is_same_v<T, UVec3> ||
     std::is_same_v<T, Mat4>;
 
+inline constexpr std::uint32_t kVersion = 2;  // 2: passes on request
+inline constexpr std::uint32_t kOldestVersion = 1;
+
 class Writer {
   public:
     template <class T>
     using Value = const T;
+
+    [[nodiscard]] static std::uint32_t version() { return kVersion; }
 
     template <class... T>
     void operator()(const T&... values) {
@@ -91,7 +96,10 @@ class Reader {
     template <class T>
     using Value = T;
 
-    explicit Reader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
+    explicit Reader(std::span<const std::uint8_t> bytes, std::uint32_t version)
+        : rest_(bytes), version_(version) {}
+
+    [[nodiscard]] std::uint32_t version() const { return version_; }
 
     template <class... T>
     void operator()(T&... values) {
@@ -169,6 +177,7 @@ class Reader {
     }
 
     std::span<const std::uint8_t> rest_;
+    std::uint32_t version_;
 };
 
 }  // namespace pharos::dump

@@ -1,7 +1,7 @@
 // Which members the dump format holds, in order: one list for writing and reading.
 //
 // Structured bindings name every member, so that a structure that gains one does not compile until
-// it is listed here (and dump.cpp's kVersion raised).
+// it is listed here (and kVersion raised, dump_archive.h).
 #pragma once
 
 #include "scene/dump_archive.h"
@@ -194,6 +194,12 @@ void fields(Archive& archive, DumpValue<Archive, RenderSettings>& value) {
 }
 
 template <class Archive>
+void fields(Archive& archive, DumpValue<Archive, PassesDescription>& value) {
+    auto& [wanted, mist_start, mist_depth, mist_falloff, object_indices, material_indices] = value;
+    archive(wanted, mist_start, mist_depth, mist_falloff, object_indices, material_indices);
+}
+
+template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, SceneDescription>& value) {
     auto& [blender_version,
            meshes,
@@ -206,9 +212,13 @@ void fields(Archive& archive, DumpValue<Archive, SceneDescription>& value) {
            has_camera,
            camera,
            film,
-           settings] = value;
+           settings,
+           passes] = value;
     archive(blender_version, meshes, materials, material_sets, instances, images, lights, world);
     archive(has_camera, camera, film, settings);
+    if (archive.version() >= 2) {
+        archive(passes);
+    }
 }
 
 }  // namespace pharos

@@ -36,6 +36,7 @@ struct Scene {
     std::vector<Instance> instances;  // those that can be shown, in the description's order
     std::vector<InstanceSurface> surfaces;  // of each instance
     std::vector<Bounds3> mesh_bounds;       // object space
+    std::vector<std::uint32_t> pass_index;  // of each instance; empty: not asked for
     std::vector<Material> materials;        // one per description.materials, then the grey default
     std::vector<Texture> textures;
     Material world;

@@ -59,6 +59,16 @@ struct RenderSettings {
     bool caustics_refractive = true;
 };
 
+// What the passes on request need beside the scene (film/passes.h).
+struct PassesDescription {
+    std::uint32_t wanted = 0;  // pass_bit() of each
+    float mist_start = 5.0f;
+    float mist_depth = 25.0f;
+    float mist_falloff = 2.0f;                    // exponent
+    std::vector<std::uint32_t> object_indices;    // of each instance; 0 beyond the end
+    std::vector<std::uint32_t> material_indices;  // of each material; likewise
+};
+
 struct SceneDescription {
     std::uint32_t blender_version = 304;  // major * 100 + minor: formulas of the look follow it
     std::vector<Mesh> meshes;
@@ -73,6 +83,7 @@ struct SceneDescription {
     CameraDescription camera;
     FilmDescription film;
     RenderSettings settings;
+    PassesDescription passes;
 };
 
 }  // namespace pharos

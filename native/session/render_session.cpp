@@ -65,6 +65,7 @@ struct RenderSession::Impl {
     unsigned threads = 0;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
+    PassLayout passes;
 
     mutable std::mutex mutex;  // guards everything below but the film's pixels
     mutable std::condition_variable ended;
@@ -135,7 +136,8 @@ void RenderSession::Impl::render(const Scene& scene) {
     const RenderSettings& settings = scene.description.settings;
     ThreadPool pool(threads);
     Integrator integrator(scene, pool);
-    const auto shared_film = std::make_shared<SharedFilm>(scene.description.film);
+    const auto shared_film = std::make_shared<SharedFilm>(
+        scene.description.film, PassLayout(scene.description.passes.wanted));
     const std::uint64_t pixels = std::uint64_t{width} * height;
     const Clock::time_point begin = Clock::now();
     {
@@ -172,8 +174,12 @@ void RenderSession::Impl::render(const Scene& scene) {
                                         std::chrono::duration<float>(settings.time_limit));
         }
         if (stop.reached()) {
-            return;
+            break;
         }
+    }
+    if (shared_film->film.passes().wants_any(kGuidePasses) && !cancel.cancelled()) {
+        integrator.render_guide_passes(guide.next_pass(), *shared_film);
+        finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
     }
 }
 
@@ -234,6 +240,7 @@ RenderSession::RenderSession(SceneDescription description,
     impl_->threads = threads;
     impl_->width = description.film.crop_width;
     impl_->height = description.film.crop_height;
+    impl_->passes = PassLayout(description.passes.wanted);
     std::ranges::sort(snapshot_samples);
     impl_->snapshot_samples = std::move(snapshot_samples);
     impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
@@ -299,7 +306,14 @@ std::uint32_t RenderSession::height() const {
     return impl_->height;
 }
 
+bool RenderSession::has(FilmPass pass) const {
+    return film_pass_info(pass).kind == PassKind::Basic || impl_->passes.wants(pass);
+}
+
 bool RenderSession::read(FilmPass pass, std::span<float> out) const {
+    if (!has(pass)) {
+        return false;
+    }
     const std::size_t expected = std::size_t{impl_->width} * impl_->height *
                                  static_cast<std::size_t>(film_pass_channels(pass));
     if (out.size() != expected) {

@@ -84,9 +84,12 @@ class RenderSession {
     [[nodiscard]] std::uint32_t width() const;  // of the rendered window
     [[nodiscard]] std::uint32_t height() const;
 
+    // Whether a pass is there to be read: a basic one, or one that the description asks for.
+    [[nodiscard]] bool has(FilmPass pass) const;
+
     // The newest complete state of a pass: width * height * film_pass_channels(pass) floats, bottom
-    // row first. False while there is no picture yet (out is untouched). Throws
-    // std::invalid_argument for a wrong size.
+    // row first. False while there is no picture yet or without the pass (out is untouched).
+    // Throws std::invalid_argument for a wrong size.
     bool read(FilmPass pass, std::span<float> out) const;
 
   private:

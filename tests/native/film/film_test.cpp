@@ -66,6 +66,47 @@ TEST(Film, ExposureScalesLightAndNothingElse) {
     EXPECT_FLOAT_EQ(albedo[0], 0.2f);
 }
 
+TEST(Film, PassesOnRequestTakePlaceOnlyWhenWanted) {
+    EXPECT_EQ(PassLayout().size(), 0u);
+    EXPECT_EQ(PassLayout(pass_bit(FilmPass::Combined) | pass_bit(FilmPass::Count)).size(), 0u);
+    const PassLayout layout(pass_bit(FilmPass::Uv) | pass_bit(FilmPass::Position) |
+                            pass_bit(FilmPass::GuideKappa));
+    EXPECT_EQ(layout.sample_size(), 6u);
+    EXPECT_EQ(layout.size(), 7u);
+    EXPECT_TRUE(layout.wants(FilmPass::GuideKappa));
+    EXPECT_FALSE(layout.wants(FilmPass::Mist));
+    EXPECT_FALSE(Film(frame(1, 1), layout).has(FilmPass::Mist));
+}
+
+TEST(Film, PassesOnRequestAreMeansOrOfTheFirstSample) {
+    FilmDescription description = frame(1, 1);
+    description.exposure = 2.0f;
+    const PassLayout layout(pass_bit(FilmPass::Emission) | pass_bit(FilmPass::ObjectIndex) |
+                            pass_bit(FilmPass::Mist) | pass_bit(FilmPass::GuideShare));
+    Film film(description, layout);
+    std::vector<float> values(layout.sample_size());
+    for (const float x : {1.0f, 3.0f}) {
+        values[layout.offset(FilmPass::Emission)] = x;
+        values[layout.offset(FilmPass::ObjectIndex)] = x;
+        values[layout.offset(FilmPass::Mist)] = 0.1f * x;
+        film.add_passes(0, values, x);
+        film.add(0, {}, static_cast<double>(x), true);
+    }
+    film.set_pass(FilmPass::GuideShare, 0, std::vector<float>{0.5f});
+    const auto value = [&](FilmPass pass) {
+        std::vector<float> out(static_cast<std::size_t>(film_pass_channels(pass)));
+        film.read(pass, out);
+        return out[0];
+    };
+    EXPECT_FLOAT_EQ(value(FilmPass::Emission), 2.0f * (1.0f + 9.0f) / 4.0f);
+    EXPECT_EQ(value(FilmPass::ObjectIndex), 1.0f);
+    EXPECT_FLOAT_EQ(value(FilmPass::Mist), 1.0f - 0.25f);
+    EXPECT_EQ(value(FilmPass::GuideShare), 0.5f);
+    film.clear();
+    EXPECT_EQ(value(FilmPass::Mist), 1.0f);
+    EXPECT_EQ(value(FilmPass::GuideShare), 0.0f);
+}
+
 // The noise estimate follows the true error of the mean.
 TEST(Film, NoiseEstimateIsTheStandardError) {
     constexpr int kPixels = 4000;

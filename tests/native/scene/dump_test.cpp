@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "film/passes.h"
 #include "support/description_builders.h"
 
 namespace pharos::testing {
@@ -72,6 +73,7 @@ SceneDescription full_description() {
     b.settings().guiding = GuidingMode::Slides;
     b.settings().caustics_refractive = false;
     b.description().blender_version = 405;
+    b.description().passes = {pass_bit(FilmPass::Mist), 1.0f, 2.0f, 0.5f, {7, 8}, {9}};
     return b.build();
 }
 
@@ -104,6 +106,28 @@ TEST(Dump, RoundTripIsBitEqual) {
     EXPECT_EQ(back.film.crop_height, 48u);
     EXPECT_EQ(back.settings.guiding, GuidingMode::Slides);
     EXPECT_FALSE(back.settings.caustics_refractive);
+    EXPECT_EQ(back.passes.wanted, pass_bit(FilmPass::Mist));
+    EXPECT_EQ(back.passes.mist_falloff, 0.5f);
+    EXPECT_EQ(back.passes.object_indices, (std::vector<std::uint32_t>{7, 8}));
+}
+
+// Version 1 ends before the passes on request.
+TEST(Dump, FilesOfTheFirstVersionAreRead) {
+    SceneDescription description = full_description();
+    description.passes = {};
+    std::vector<std::uint8_t> bytes = dump_to_bytes(description);
+    constexpr std::size_t kHeader = 32;
+    constexpr std::size_t kPasses = 4 * sizeof(float) + 2 * sizeof(std::uint64_t);
+    bytes.resize(bytes.size() - kPasses);
+    const std::uint64_t size = bytes.size() - kHeader;
+    std::uint64_t checksum = 0xcbf29ce484222325u;
+    for (std::size_t i = kHeader; i < bytes.size(); ++i) {
+        checksum = (checksum ^ bytes[i]) * 0x100000001b3u;
+    }
+    bytes[8] = 1;
+    std::memcpy(&bytes[16], &size, sizeof(size));
+    std::memcpy(&bytes[24], &checksum, sizeof(checksum));
+    EXPECT_EQ(dump_to_bytes(dump_from_bytes(bytes)), dump_to_bytes(description));
 }
 
 TEST(Dump, EmptyDescription) {
@@ -167,9 +191,9 @@ TEST(Dump, ErrorsNameFileAndReason) {
     bytes[100] ^= 1u;
     store(bytes);
     EXPECT_NE(message().find("checksum"), std::string::npos);
-    bytes[8] = 2;  // version
+    bytes[8] = 77;  // version
     store(bytes);
-    EXPECT_NE(message().find("version 2"), std::string::npos);
+    EXPECT_NE(message().find("version 77"), std::string::npos);
     EXPECT_THROW(static_cast<void>(read_dump(directory.file("."))), std::runtime_error);
 }
 

@@ -1,0 +1,91 @@
+// The passes of a picture beside its colour: which there are, which are asked for, where they lie.
+//
+// Every film holds the basic passes. The others cost nothing unless they are asked for: PassLayout
+// gives each a place in one block of floats per camera sample (what paths write, averaged over the
+// samples or taken from the first) and then in a block per pixel (what is written at the end).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace pharos {
+
+// Stored by number in dump files: append only.
+enum class FilmPass : std::uint8_t {
+    // basic
+    Combined,
+    Depth,
+    Normal,
+    DenoisingNormal,
+    DenoisingAlbedo,
+    SampleCount,
+    // on request
+    Position,         // first hit, world space
+    Uv,               // of the map rendered by default; third channel 1 where there is one
+    Mist,             // 0 near ... 1 far and background
+    ObjectIndex,      // pass index of the first hit's object
+    MaterialIndex,    // and of its material
+    Emission,         // surfaces the camera sees directly
+    Environment,      // the world, likewise
+    GuideDirection,   // mean direction of the learned light at the first hit; zero: not guided
+    GuideKappa,       // concentration of a single lobe with the same mean
+    GuideIrradiance,  // A
+    GuideShare,       // of the sampling that follows the guide; the rest follows the material
+    Count
+};
+
+inline constexpr std::size_t kFilmPasses = static_cast<std::size_t>(FilmPass::Count);
+
+enum class PassKind : std::uint8_t {
+    Basic,
+    Average,      // weighted mean over the samples
+    FirstSample,  // of the first sample: a mean would be of nothing
+    AtTheEnd      // written once by whoever knows it
+};
+
+struct FilmPassInfo {
+    const char* name;      // in files
+    const char* channels;  // their letters
+    PassKind kind;
+    bool exposed;  // light: multiplied by the film's exposure
+};
+
+[[nodiscard]] const FilmPassInfo& film_pass_info(FilmPass pass);
+[[nodiscard]] int film_pass_channels(FilmPass pass);
+
+[[nodiscard]] constexpr std::uint32_t pass_bit(FilmPass pass) {
+    return 1u << static_cast<unsigned>(pass);
+}
+
+inline constexpr std::uint32_t kGuidePasses =
+    pass_bit(FilmPass::GuideDirection) | pass_bit(FilmPass::GuideKappa) |
+    pass_bit(FilmPass::GuideIrradiance) | pass_bit(FilmPass::GuideShare);
+
+class PassLayout {
+  public:
+    // Bits of unknown and of basic passes are ignored.
+    explicit PassLayout(std::uint32_t wanted = 0);
+
+    [[nodiscard]] bool wants(FilmPass pass) const { return (wanted_ & pass_bit(pass)) != 0; }
+
+    [[nodiscard]] bool wants_any(std::uint32_t bits) const { return (wanted_ & bits) != 0; }
+
+    // First float of a pass that is wanted.
+    [[nodiscard]] std::uint32_t offset(FilmPass pass) const {
+        return offset_[static_cast<std::size_t>(pass)];
+    }
+
+    // Floats of a camera sample; the rest of the block is written at the end.
+    [[nodiscard]] std::uint32_t sample_size() const { return sample_size_; }
+
+    [[nodiscard]] std::uint32_t size() const { return size_; }
+
+  private:
+    std::uint32_t wanted_ = 0;
+    std::uint32_t sample_size_ = 0;
+    std::uint32_t size_ = 0;
+    std::array<std::uint32_t, kFilmPasses> offset_{};
+};
+
+}  // namespace pharos
