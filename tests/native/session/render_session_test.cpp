@@ -8,6 +8,7 @@
 #include "session/pass_schedule.h"
 #include "support/description_builders.h"
 #include "support/render.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -109,40 +110,51 @@ TEST(RenderSession, SkippedStagesCountNothing) {
 }
 
 TEST(RenderSession, CancelKeepsThePicture) {
-    RenderSession session(room(256, 256, 100000), 2);
-    while (session.progress().samples < 2) {
-        ASSERT_FALSE(session.wait(std::chrono::milliseconds(5)));
-    }
-    const auto begin = std::chrono::steady_clock::now();
-    session.cancel();
-    ASSERT_TRUE(session.wait(std::chrono::seconds(5)));
-    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 1.0);
-    EXPECT_EQ(session.progress().state, SessionState::Cancelled);
-    std::vector<float> count(256 * 256);
-    ASSERT_TRUE(session.read(FilmPass::SampleCount, count));
-    EXPECT_GE(*std::min_element(count.begin(), count.end()), 2.0f);
+    constexpr double kBar = 1.0 * kSlowdown;
+    const double seconds = best_seconds(kBar, [] {
+        RenderSession session(room(256, 256, 100000), 2);
+        while (session.progress().samples < 2) {
+            EXPECT_FALSE(session.wait(std::chrono::milliseconds(5)));
+        }
+        const Stopwatch since_cancel;
+        session.cancel();
+        EXPECT_TRUE(session.wait(std::chrono::seconds(60)));
+        const double elapsed = since_cancel.seconds();
+        EXPECT_EQ(session.progress().state, SessionState::Cancelled);
+        std::vector<float> count(256 * 256);
+        EXPECT_TRUE(session.read(FilmPass::SampleCount, count));
+        EXPECT_GE(*std::min_element(count.begin(), count.end()), 2.0f);
+        return elapsed;
+    });
+    EXPECT_LT(seconds, kBar);
 }
 
 TEST(RenderSession, TimeLimitStopsAndDelivers) {
-    SceneDescription description = room(128, 128, 1000000);
-    description.settings.time_limit = 0.3f;
-    const auto begin = std::chrono::steady_clock::now();
-    const Rendered result = render(std::move(description));
-    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 3.0);
-    EXPECT_EQ(result.progress.state, SessionState::Finished);
-    EXPECT_GT(result.mean(0), 0.01);
+    constexpr double kBar = 3.0 * kSlowdown;
+    const double seconds = best_seconds(kBar, [] {
+        SceneDescription description = room(128, 128, 1000000);
+        description.settings.time_limit = 0.3f;
+        const Stopwatch since_start;
+        const Rendered result = render(std::move(description));
+        const double elapsed = since_start.seconds();
+        EXPECT_EQ(result.progress.state, SessionState::Finished);
+        EXPECT_LT(result.progress.samples, 1000000u);
+        EXPECT_GT(result.mean(0), 0.01);
+        return elapsed;
+    });
+    EXPECT_LT(seconds, kBar);
 }
 
 TEST(RenderSession, SnapshotsAreShorterRenders) {
     SceneDescription description = room(24, 16, 16);
     RenderSession session(description, 2, {16, 4});
-    ASSERT_TRUE(session.wait(std::chrono::seconds(20)));
+    ASSERT_TRUE(session.wait(std::chrono::minutes(4)));
     const auto snapshots = session.snapshots();
     ASSERT_EQ(snapshots.size(), 2u);
     EXPECT_EQ(snapshots[0].samples, 4u);
     description.settings.samples = 4;
     EXPECT_EQ(snapshots[0].combined, render(std::move(description)).combined);
-    EXPECT_GT(snapshots[1].cpu_seconds, snapshots[0].cpu_seconds);
+    EXPECT_GE(snapshots[1].cpu_seconds, snapshots[0].cpu_seconds);  // clocks may be coarse
 }
 
 TEST(RenderSession, ErrorsAreSentences) {
