@@ -1,4 +1,7 @@
 // The enumerations of descriptions and sessions, by name.
+#include <initializer_list>
+#include <utility>
+
 #include <pybind11/pybind11.h>
 
 #include "bindings/bindings.h"
@@ -8,7 +11,6 @@
 #include "geometry/mesh.h"
 #include "image/image_description.h"
 #include "lights/light_description.h"
-#include "materials/node_program.h"
 #include "scene/scene_description.h"
 #include "session/render_session.h"
 
@@ -18,63 +20,79 @@ namespace pharos {
 namespace {
 
 template <class Enum>
-py::enum_<Enum> enumeration(py::module_& m, const char* name) {
-    return py::enum_<Enum>(m, name, py::module_local());
+void enumeration(py::module_& m,
+                 const char* name,
+                 std::initializer_list<std::pair<const char*, Enum>> values) {
+    py::enum_<Enum> bound(m, name, py::module_local());
+    for (const auto& [value_name, value] : values) {
+        bound.value(value_name, value);
+    }
 }
 
 void bind_image_enums(py::module_& m) {
-    enumeration<ImageInterpolation>(m, "ImageInterpolation")
-        .value("Linear", ImageInterpolation::Linear)
-        .value("Closest", ImageInterpolation::Closest)
-        .value("Cubic", ImageInterpolation::Cubic)
-        .value("Smart", ImageInterpolation::Smart);
-    enumeration<ImageExtension>(m, "ImageExtension")
-        .value("Repeat", ImageExtension::Repeat)
-        .value("Extend", ImageExtension::Extend)
-        .value("Clip", ImageExtension::Clip)
-        .value("Mirror", ImageExtension::Mirror);
-    enumeration<ImageProjection>(m, "ImageProjection")
-        .value("Flat", ImageProjection::Flat)
-        .value("Box", ImageProjection::Box)
-        .value("Sphere", ImageProjection::Sphere)
-        .value("Tube", ImageProjection::Tube)
-        .value("Equirectangular", ImageProjection::Equirectangular)
-        .value("MirrorBall", ImageProjection::MirrorBall);
-    enumeration<ImageColorSpace>(m, "ImageColorSpace")
-        .value("Srgb", ImageColorSpace::Srgb)
-        .value("Linear", ImageColorSpace::Linear)
-        .value("Data", ImageColorSpace::Data);
-    enumeration<ImageAlpha>(m, "ImageAlpha")
-        .value("Straight", ImageAlpha::Straight)
-        .value("Premultiplied", ImageAlpha::Premultiplied)
-        .value("ChannelPacked", ImageAlpha::ChannelPacked)
-        .value("None_", ImageAlpha::None);
+    using Interpolation = ImageInterpolation;
+    enumeration<Interpolation>(m,
+                               "ImageInterpolation",
+                               {{"Linear", Interpolation::Linear},
+                                {"Closest", Interpolation::Closest},
+                                {"Cubic", Interpolation::Cubic},
+                                {"Smart", Interpolation::Smart}});
+    using Extension = ImageExtension;
+    enumeration<Extension>(m,
+                           "ImageExtension",
+                           {{"Repeat", Extension::Repeat},
+                            {"Extend", Extension::Extend},
+                            {"Clip", Extension::Clip},
+                            {"Mirror", Extension::Mirror}});
+    using Projection = ImageProjection;
+    enumeration<Projection>(m,
+                            "ImageProjection",
+                            {{"Flat", Projection::Flat},
+                             {"Box", Projection::Box},
+                             {"Sphere", Projection::Sphere},
+                             {"Tube", Projection::Tube},
+                             {"Equirectangular", Projection::Equirectangular},
+                             {"MirrorBall", Projection::MirrorBall}});
+    using Space = ImageColorSpace;
+    enumeration<Space>(m,
+                       "ImageColorSpace",
+                       {{"Srgb", Space::Srgb}, {"Linear", Space::Linear}, {"Data", Space::Data}});
+    enumeration<ImageAlpha>(m,
+                            "ImageAlpha",
+                            {{"Straight", ImageAlpha::Straight},
+                             {"Premultiplied", ImageAlpha::Premultiplied},
+                             {"ChannelPacked", ImageAlpha::ChannelPacked},
+                             {"None_", ImageAlpha::None}});
 }
 
 void bind_scene_enums(py::module_& m) {
-    enumeration<NormalDomain>(m, "NormalDomain")
-        .value("Face", NormalDomain::Face)
-        .value("Vertex", NormalDomain::Vertex)
-        .value("Corner", NormalDomain::Corner);
-    enumeration<LightType>(m, "LightType")
-        .value("Point", LightType::Point)
-        .value("Spot", LightType::Spot)
-        .value("Area", LightType::Area)
-        .value("Sun", LightType::Sun);
-    enumeration<AreaShape>(m, "AreaShape")
-        .value("Rectangle", AreaShape::Rectangle)
-        .value("Ellipse", AreaShape::Ellipse);
-    enumeration<CameraType>(m, "CameraType")
-        .value("Perspective", CameraType::Perspective)
-        .value("Orthographic", CameraType::Orthographic);
-    enumeration<PixelFilter>(m, "PixelFilter")
-        .value("Box", PixelFilter::Box)
-        .value("Gaussian", PixelFilter::Gaussian)
-        .value("BlackmanHarris", PixelFilter::BlackmanHarris);
-    enumeration<GuidingMode>(m, "GuidingMode")
-        .value("Off", GuidingMode::Off)
-        .value("Neural", GuidingMode::Neural)
-        .value("Slides", GuidingMode::Slides);
+    enumeration<NormalDomain>(m,
+                              "NormalDomain",
+                              {{"Face", NormalDomain::Face},
+                               {"Vertex", NormalDomain::Vertex},
+                               {"Corner", NormalDomain::Corner}});
+    enumeration<LightType>(m,
+                           "LightType",
+                           {{"Point", LightType::Point},
+                            {"Spot", LightType::Spot},
+                            {"Area", LightType::Area},
+                            {"Sun", LightType::Sun}});
+    enumeration<AreaShape>(
+        m, "AreaShape", {{"Rectangle", AreaShape::Rectangle}, {"Ellipse", AreaShape::Ellipse}});
+    enumeration<CameraType>(
+        m,
+        "CameraType",
+        {{"Perspective", CameraType::Perspective}, {"Orthographic", CameraType::Orthographic}});
+    enumeration<PixelFilter>(m,
+                             "PixelFilter",
+                             {{"Box", PixelFilter::Box},
+                              {"Gaussian", PixelFilter::Gaussian},
+                              {"BlackmanHarris", PixelFilter::BlackmanHarris}});
+    enumeration<GuidingMode>(m,
+                             "GuidingMode",
+                             {{"Off", GuidingMode::Off},
+                              {"Neural", GuidingMode::Neural},
+                              {"Slides", GuidingMode::Slides}});
     m.attr("VISIBLE_CAMERA") = static_cast<unsigned>(kVisibleCamera);
     m.attr("VISIBLE_DIFFUSE") = static_cast<unsigned>(kVisibleDiffuse);
     m.attr("VISIBLE_GLOSSY") = static_cast<unsigned>(kVisibleGlossy);
@@ -84,24 +102,48 @@ void bind_scene_enums(py::module_& m) {
 }
 
 void bind_session_enums(py::module_& m) {
-    enumeration<FilmPass>(m, "FilmPass")
-        .value("Combined", FilmPass::Combined)
-        .value("Depth", FilmPass::Depth)
-        .value("Normal", FilmPass::Normal)
-        .value("DenoisingNormal", FilmPass::DenoisingNormal)
-        .value("DenoisingAlbedo", FilmPass::DenoisingAlbedo)
-        .value("SampleCount", FilmPass::SampleCount);
-    enumeration<SessionState>(m, "SessionState")
-        .value("Building", SessionState::Building)
-        .value("Rendering", SessionState::Rendering)
-        .value("Finished", SessionState::Finished)
-        .value("Cancelled", SessionState::Cancelled)
-        .value("Failed", SessionState::Failed);
-    enumeration<Severity>(m, "Severity")
-        .value("Info", Severity::Info)
-        .value("Warning", Severity::Warning)
-        .value("Error", Severity::Error);
+    enumeration<SessionState>(m,
+                              "SessionState",
+                              {{"Building", SessionState::Building},
+                               {"Rendering", SessionState::Rendering},
+                               {"Finished", SessionState::Finished},
+                               {"Cancelled", SessionState::Cancelled},
+                               {"Failed", SessionState::Failed}});
+    enumeration<GuideState>(m,
+                            "GuideState",
+                            {{"Off", GuideState::Off},
+                             {"Learning", GuideState::Learning},
+                             {"Unproven", GuideState::Unproven},
+                             {"Guiding", GuideState::Guiding},
+                             {"Closed", GuideState::Closed}});
+    enumeration<Severity>(
+        m,
+        "Severity",
+        {{"Info", Severity::Info}, {"Warning", Severity::Warning}, {"Error", Severity::Error}});
+}
+
+void bind_passes(py::module_& m) {
+    enumeration<FilmPass>(m,
+                          "FilmPass",
+                          {{"Combined", FilmPass::Combined},
+                           {"Depth", FilmPass::Depth},
+                           {"Normal", FilmPass::Normal},
+                           {"DenoisingNormal", FilmPass::DenoisingNormal},
+                           {"DenoisingAlbedo", FilmPass::DenoisingAlbedo},
+                           {"SampleCount", FilmPass::SampleCount},
+                           {"Position", FilmPass::Position},
+                           {"Uv", FilmPass::Uv},
+                           {"Mist", FilmPass::Mist},
+                           {"ObjectIndex", FilmPass::ObjectIndex},
+                           {"MaterialIndex", FilmPass::MaterialIndex},
+                           {"Emission", FilmPass::Emission},
+                           {"Environment", FilmPass::Environment},
+                           {"GuideDirection", FilmPass::GuideDirection},
+                           {"GuideKappa", FilmPass::GuideKappa},
+                           {"GuideIrradiance", FilmPass::GuideIrradiance},
+                           {"GuideShare", FilmPass::GuideShare}});
     m.def("film_pass_channels", &film_pass_channels, FloatGuard(), py::arg("film_pass"));
+    m.def("pass_bit", &pass_bit, FloatGuard(), py::arg("film_pass"));
 }
 
 }  // namespace
@@ -110,6 +152,7 @@ void bind_enums(py::module_& m) {
     bind_image_enums(m);
     bind_scene_enums(m);
     bind_session_enums(m);
+    bind_passes(m);
 }
 
 }  // namespace pharos

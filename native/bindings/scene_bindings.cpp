@@ -257,6 +257,13 @@ void bind_views(py::module_& m) {
         .def_readwrite("transparent_bounces", &RenderSettings::transparent_bounces)
         .def_readwrite("caustics_reflective", &RenderSettings::caustics_reflective)
         .def_readwrite("caustics_refractive", &RenderSettings::caustics_refractive);
+    py::class_<PassesDescription>(m, "PassesDescription", py::module_local())
+        .def_readwrite("wanted", &PassesDescription::wanted)
+        .def_readwrite("mist_start", &PassesDescription::mist_start)
+        .def_readwrite("mist_depth", &PassesDescription::mist_depth)
+        .def_readwrite("mist_falloff", &PassesDescription::mist_falloff)
+        .def_readwrite("object_indices", &PassesDescription::object_indices)
+        .def_readwrite("material_indices", &PassesDescription::material_indices);
 }
 
 void bind_adders(py::class_<SceneDescription>& scene) {
@@ -377,6 +384,10 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             [](SceneDescription& s, const py::kwargs& fields) {
                 assign_fields(s.settings, fields);
             },
+            FloatGuard())
+        .def(
+            "set_passes",
+            [](SceneDescription& s, const py::kwargs& fields) { assign_fields(s.passes, fields); },
             FloatGuard());
 }
 
@@ -399,6 +410,7 @@ void bind_scene(py::module_& m) {
         .def_readonly("camera", &SceneDescription::camera)
         .def_readonly("film", &SceneDescription::film)
         .def_readonly("settings", &SceneDescription::settings)
+        .def_readonly("passes", &SceneDescription::passes)
         .def_readonly("world", &SceneDescription::world)
         .def_readonly("lights", &SceneDescription::lights)
         .def_readonly("images", &SceneDescription::images)

@@ -27,7 +27,23 @@ bool read_pass(const RenderSession& session,
     return session.read(pass, pixels);
 }
 
+void bind_guide_status(py::module_& m) {
+    py::class_<GuideStatus>(m, "GuideStatus", py::module_local())
+        .def_readonly("enabled", &GuideStatus::enabled)
+        .def_readonly("guided_share", &GuideStatus::guided_share)
+        .def_readonly("moment_ratio", &GuideStatus::moment_ratio)
+        .def_readonly("loss", &GuideStatus::loss)
+        .def_readonly("held_out_loss", &GuideStatus::held_out_loss)
+        .def_readonly("snapshots", &GuideStatus::snapshots)
+        .def_readonly("records", &GuideStatus::records)
+        .def_readonly("skipped_steps", &GuideStatus::skipped_steps)
+        .def_property_readonly("state", &guide_state)
+        .def_property_readonly("why_unguided",
+                               [](const GuideStatus& s) { return why_unguided(guide_state(s)); });
+}
+
 void bind_results(py::module_& m) {
+    bind_guide_status(m);
     py::class_<SessionProgress>(m, "SessionProgress", py::module_local())
         .def_readonly("state", &SessionProgress::state)
         .def_readonly("error", &SessionProgress::error)
@@ -39,7 +55,8 @@ void bind_results(py::module_& m) {
         .def_readonly("remaining", &SessionProgress::remaining)
         .def_readonly("noise", &SessionProgress::noise)
         .def_readonly("memory_bytes", &SessionProgress::memory_bytes)
-        .def_readonly("nonfinite_samples", &SessionProgress::nonfinite_samples);
+        .def_readonly("nonfinite_samples", &SessionProgress::nonfinite_samples)
+        .def_readonly("guiding", &SessionProgress::guiding);
     py::class_<StageStatistics>(m, "StageStatistics", py::module_local())
         .def_readonly("name", &StageStatistics::name)
         .def_readonly("items", &StageStatistics::items)

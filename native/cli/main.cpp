@@ -17,6 +17,8 @@ constexpr const char* kUsage =
     "  --guiding MODE     off, neural or slides (default: the file's)\n"
     "  --nee on|off       next-event estimation (default: the file's)\n"
     "  --time-limit S     stop after S seconds\n"
+    "  --passes A,B       passes beside the basic ones: names, all, guide or none (default: the "
+    "file's)\n"
     "  --snapshots A,B    also write OUT.A.exr, OUT.B.exr after that many samples\n"
     "  --stats            print work and time per stage\n"
     "  --stats-json FILE  write the same, with the snapshots' CPU seconds, as JSON\n"

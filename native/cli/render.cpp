@@ -32,6 +32,7 @@ struct Options {
     std::optional<GuidingMode> guiding;
     unsigned threads = 0;
     std::vector<std::uint32_t> snapshots;
+    std::optional<std::uint32_t> passes;
     bool stats = false;
     std::string stats_json;
 };
@@ -73,6 +74,32 @@ std::vector<std::uint32_t> parse_list(const std::string& name, const std::string
     return values;
 }
 
+// "Position,Guide Kappa" or one of the words all, guide, none; the bits of the passes.
+std::uint32_t parse_passes(const std::string& text) {
+    if (text == "none") {
+        return 0;
+    }
+    if (text == "guide") {
+        return kGuidePasses;
+    }
+    std::uint32_t bits = 0;
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        const std::string name = text.substr(begin, end - begin);
+        std::uint32_t found = 0;
+        for (std::size_t i = 0; i < kFilmPasses; ++i) {
+            const auto pass = static_cast<FilmPass>(i);
+            found |= text == "all" || name == film_pass_info(pass).name ? pass_bit(pass) : 0u;
+        }
+        if (found == 0) {
+            throw UsageError("--passes: there is no pass '" + name + "'");
+        }
+        bits |= found;
+        begin = end + 1;
+    }
+    return bits;
+}
+
 void parse_option(const std::string& name, const std::string& value, Options& options) {
     if (name == "-o" || name == "--output") {
         options.output = value;
@@ -93,6 +120,8 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         options.nee = value == "on";
     } else if (name == "--snapshots") {
         options.snapshots = parse_list(name, value);
+    } else if (name == "--passes") {
+        options.passes = parse_passes(value);
     } else if (name == "--stats-json") {
         options.stats_json = value;
     } else {
@@ -138,27 +167,20 @@ std::string snapshot_path(const std::string& output, std::uint32_t samples) {
 }
 
 void write_picture(const RenderSession& session, const std::string& path) {
-    struct Output {
-        FilmPass pass;
-        const char* name;
-        const char* channels;
-    };
-
-    constexpr Output kOutputs[] = {{FilmPass::Combined, "Combined", "RGBA"},
-                                   {FilmPass::Depth, "Depth", "Z"},
-                                   {FilmPass::Normal, "Normal", "XYZ"},
-                                   {FilmPass::DenoisingAlbedo, "Denoising Albedo", "RGB"},
-                                   {FilmPass::DenoisingNormal, "Denoising Normal", "XYZ"}};
     const std::size_t pixels = std::size_t{session.width()} * session.height();
     std::vector<std::vector<float>> buffers;
     std::vector<ExrPass> passes;
-    for (const Output& output : kOutputs) {
-        auto& buffer = buffers.emplace_back(
-            pixels * static_cast<std::size_t>(film_pass_channels(output.pass)));
-        if (!session.read(output.pass, buffer)) {
+    for (std::size_t i = 0; i < kFilmPasses; ++i) {
+        const auto pass = static_cast<FilmPass>(i);
+        if (pass == FilmPass::SampleCount || !session.has(pass)) {
+            continue;
+        }
+        auto& buffer =
+            buffers.emplace_back(pixels * static_cast<std::size_t>(film_pass_channels(pass)));
+        if (!session.read(pass, buffer)) {
             throw std::runtime_error("there is no picture to write");
         }
-        passes.push_back({output.name, output.channels, buffer});
+        passes.push_back({film_pass_info(pass).name, film_pass_info(pass).channels, buffer});
     }
     const ExrOptions options{
         false,
@@ -202,16 +224,39 @@ void print_statistics(const RenderSession& session) {
                 static_cast<unsigned long long>(progress.nonfinite_samples));
 }
 
+void print_guide(const GuideStatus& guide) {
+    if (!guide.enabled) {
+        return;
+    }
+    const std::string_view why = why_unguided(guide_state(guide));
+    std::printf(
+        "guide %.*s%s%.1f %% of the vertices, loss %.4f (held out %.4f), moment ratio %.3f\n",
+        static_cast<int>(why.size()),
+        why.data(),
+        why.empty() ? "" : ", ",
+        100.0 * guide.guided_share,
+        static_cast<double>(guide.loss),
+        static_cast<double>(guide.held_out_loss),
+        guide.moment_ratio);
+    std::printf("guide snapshots %llu, records %llu, skipped steps %llu\n",
+                static_cast<unsigned long long>(guide.snapshots),
+                static_cast<unsigned long long>(guide.records),
+                static_cast<unsigned long long>(guide.skipped_steps));
+}
+
 void write_statistics_json(const RenderSession& session, const std::string& path) {
     const SessionStatistics statistics = session.statistics();
     std::ofstream out(path);
     out.precision(9);
+    const GuideStatus guide = session.progress().guiding;
     out << "{\n  \"camera_samples\": " << statistics.camera_samples
         << ",\n  \"vertices\": " << statistics.vertices << ",\n  \"rays\": " << statistics.rays
         << ",\n  \"build_seconds\": " << statistics.build_seconds
         << ",\n  \"render_cpu_seconds\": " << statistics.render_cpu_seconds
         << ",\n  \"nonfinite_samples\": " << session.progress().nonfinite_samples
-        << ",\n  \"memory_bytes\": " << session.progress().memory_bytes << ",\n  \"stages\": [";
+        << ",\n  \"memory_bytes\": " << session.progress().memory_bytes
+        << ",\n  \"guided_share\": " << guide.guided_share
+        << ",\n  \"guide_loss\": " << guide.held_out_loss << ",\n  \"stages\": [";
     for (const StageStatistics& stage : statistics.stages) {
         out << (&stage == statistics.stages.data() ? "\n" : ",\n") << "    {\"name\": \""
             << stage.name << "\", \"items\": " << stage.items << ", \"seconds\": " << stage.seconds
@@ -263,6 +308,7 @@ int render(const std::vector<std::string>& arguments) {
     const Options options = parse(arguments);
     SceneDescription description = read_dump(options.input);
     apply(options, description.settings);
+    description.passes.wanted = options.passes.value_or(description.passes.wanted);
     RenderSession session(std::move(description), options.threads, options.snapshots);
     const int code = wait_for_end(session);
     for (const ReportEntry& entry : session.report()) {
@@ -276,6 +322,7 @@ int render(const std::vector<std::string>& arguments) {
     write_snapshots(session, options.output);
     if (options.stats) {
         print_statistics(session);
+        print_guide(progress.guiding);
     }
     if (!options.stats_json.empty()) {
         write_statistics_json(session, options.stats_json);

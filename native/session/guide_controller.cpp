@@ -116,6 +116,8 @@ void GuideController::learn(RecordBuffer records,
     const double recorded = static_cast<double>(records.radiance.size());
     const TrainStatistics trained = field_->train(records.radiance, pool);
     status_.loss = trained.loss;
+    status_.held_out_loss =
+        trained.published ? trained.held_out_loss : trained.held_out_loss_before;
     status_.snapshots = field_->generation();
     status_.records += records.radiance.size();
     status_.skipped_steps += trained.skipped_steps;
