@@ -62,6 +62,13 @@ void bind_codes(py::module_& m) {
                                            {"VectorTransform", E::VectorTransform},
                                            {"VectorRotate", E::VectorRotate},
                                            {"Blackbody", E::Blackbody},
+                                           {"Noise", E::Noise},
+                                           {"Musgrave", E::Musgrave},
+                                           {"WhiteNoise", E::WhiteNoise},
+                                           {"Voronoi", E::Voronoi},
+                                           {"Wave", E::Wave},
+                                           {"Magic", E::Magic},
+                                           {"Brick", E::Brick},
                                            {"Diffuse", E::Diffuse},
                                            {"Glossy", E::Glossy},
                                            {"Glass", E::Glass},
@@ -252,6 +259,33 @@ void bind_operations(py::module_& m) {
                                                {"Sign", E::Sign}});
     }
     {
+        using E = FractalType;
+        m.attr("FractalType") = numbers<E>({{"Multifractal", E::Multifractal},
+                                            {"Fbm", E::Fbm},
+                                            {"HybridMultifractal", E::HybridMultifractal},
+                                            {"RidgedMultifractal", E::RidgedMultifractal},
+                                            {"HeteroTerrain", E::HeteroTerrain}});
+    }
+    {
+        using E = CellFeature;
+        m.attr("CellFeature") = numbers<E>({{"F1", E::F1},
+                                            {"F2", E::F2},
+                                            {"SmoothF1", E::SmoothF1},
+                                            {"DistanceToEdge", E::DistanceToEdge},
+                                            {"NSphereRadius", E::NSphereRadius}});
+    }
+    {
+        using E = CellMetric;
+        m.attr("CellMetric") = numbers<E>({{"Euclidean", E::Euclidean},
+                                           {"Manhattan", E::Manhattan},
+                                           {"Chebychev", E::Chebychev},
+                                           {"Minkowski", E::Minkowski}});
+    }
+    {
+        using E = WaveProfile;
+        m.attr("WaveProfile") = numbers<E>({{"Sin", E::Sin}, {"Saw", E::Saw}, {"Tri", E::Tri}});
+    }
+    {
         using E = BlendMode;
         m.attr("BlendMode") = numbers<E>({{"Mix", E::Mix},
                                           {"Add", E::Add},
@@ -286,6 +320,10 @@ void bind_node_enums(py::module_& m) {
     m.attr("STEP_BIT") = static_cast<int>(kStepBit);
     m.attr("EXTRAPOLATE_BIT") = static_cast<int>(kExtrapolateBit);
     m.attr("INVERT_BIT") = static_cast<int>(kInvertBit);
+    m.attr("NORMALIZE_NOISE_BIT") = static_cast<int>(kNormalizeNoiseBit);
+    m.attr("COLOR_NOISE_BIT") = static_cast<int>(kColorNoiseBit);
+    m.attr("LEGACY_NOISE_BIT") = static_cast<int>(kLegacyNoiseBit);
+    m.attr("NORMALIZE_CELLS_BIT") = static_cast<int>(kNormalizeCellsBit);
     m.attr("DEFAULT_NAME") = static_cast<int>(kDefaultName);
     m.attr("DEFAULT_OPERAND") = kDefaultOperand;
     m.attr("PRINCIPLED_V1_OPERANDS") = kPrincipledV1Operands;

@@ -22,6 +22,7 @@ using detail::OpShape;
 
 // Registers of the largest program taken: 16 MB a thread.
 constexpr std::uint32_t kMaxRegisters = 16384;
+constexpr std::size_t kMaxOutputs = 8;
 
 // What is known of a source register.
 struct Source {
@@ -218,7 +219,7 @@ void Compiler::emit_value(NodeOp op, const OpShape& shape, std::int32_t first_ta
 }
 
 void Compiler::fold(NodeOp op, const OpShape& shape, std::int32_t first_target) {
-    std::array<float, 4> result{};
+    std::array<float, kMaxOutputs> result{};
     ShadingScratch scratch;
     const ShadingContext context;
     op.output = 0;

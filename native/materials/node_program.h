@@ -72,6 +72,21 @@ enum class NodeOpCode : std::uint16_t {
     VectorRotate = 35,     // vector:3 center:3 axis:3 angle:1 rotation:3; mode = VectorRotateMode
                            // (| kInvertBit) -> 3
     Blackbody = 36,        // temperature:1 -> 3 (Rec.709 of luminance 1)
+    Noise = 37,            // vector:3 w:1 scale:1 detail:1 roughness:1 lacunarity:1 offset:1 gain:1
+    // distortion:1; mode = dimensions - 1 + 4 x FractalType | kNormalizeNoiseBit |
+    // kColorNoiseBit | kLegacyNoiseBit -> 1, with kColorNoiseBit 3 (its red)
+    Musgrave = 38,    // vector:3 w:1 scale:1 detail:1 dimension:1 lacunarity:1 offset:1 gain:1;
+                      // mode = dimensions - 1 + 4 x FractalType -> 1
+    WhiteNoise = 39,  // vector:3 w:1; mode = dimensions - 1 -> 4 (color, value)
+    Voronoi = 40,  // vector:3 w:1 scale:1 detail:1 roughness:1 lacunarity:1 smoothness:1 exponent:1
+                   // randomness:1; mode = dimensions - 1 + 4 x CellFeature + 32 x CellMetric |
+                   // kNormalizeCellsBit -> 8 (distance or radius, color, position, w)
+    Wave = 41,     // vector:3 scale:1 distortion:1 detail:1 detail_scale:1 detail_roughness:1
+                   // phase:1; mode = rings + 2 x direction + 8 x WaveProfile | kLegacyNoiseBit -> 1
+    Magic = 42,    // vector:3 scale:1 distortion:1; mode = depth -> 4 (color, factor)
+    Brick = 43,    // vector:3 color1:3 color2:3 mortar:3 scale:1 mortar_size:1 mortar_smooth:1
+                   // bias:1 width:1 height:1 offset:1 squash:1 offset_frequency:1
+                   // squash_frequency:1 -> 4 (color, factor)
     // --- closures; weight:3 is always the first operand ---
     Diffuse = 100,       // weight:3 color:3 roughness:1 normal:3
     Glossy = 101,        // weight:3 color:3 roughness:1 normal:3; mode = Distribution
@@ -135,6 +150,17 @@ enum class GradientMode : std::uint16_t {
     QuadraticSphere,
     Spherical,
 };
+
+enum class WaveProfile : std::uint16_t { Sin, Saw, Tri };
+enum class FractalType : std::uint16_t {
+    Multifractal,
+    Fbm,
+    HybridMultifractal,
+    RidgedMultifractal,
+    HeteroTerrain,
+};
+enum class CellFeature : std::uint16_t { F1, F2, SmoothF1, DistanceToEdge, NSphereRadius };
+enum class CellMetric : std::uint16_t { Euclidean, Manhattan, Chebychev, Minkowski };
 
 // Blender's operations under their names (MULTIPLY_ADD is MultiplyAdd) and numbers.
 enum class MathMode : std::uint16_t {
@@ -244,6 +270,10 @@ inline constexpr std::uint16_t kClampFactorBit = 0x4000;
 inline constexpr std::uint16_t kStepBit = 0x8000;
 inline constexpr std::uint16_t kExtrapolateBit = 0x8000;
 inline constexpr std::uint16_t kInvertBit = 0x8000;
+inline constexpr std::uint16_t kNormalizeNoiseBit = 0x20;
+inline constexpr std::uint16_t kColorNoiseBit = 0x40;
+inline constexpr std::uint16_t kLegacyNoiseBit = 0x80;  // Blender 3.x
+inline constexpr std::uint16_t kNormalizeCellsBit = 0x80;
 inline constexpr std::uint16_t kDefaultName = 0xffff;
 
 struct NodeOp {

@@ -7,6 +7,9 @@ namespace pharos::detail {
 
 namespace {
 
+constexpr std::uint16_t kFractalTypes = 5;
+constexpr std::uint16_t kCellFeatures = 5;
+
 constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Copy, OpKind::Pure, "", 0},  // by mode
     {NodeOpCode::Uv, OpKind::Hit, "", 3},
@@ -45,6 +48,13 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::VectorTransform, OpKind::Hit, "3", 3},
     {NodeOpCode::VectorRotate, OpKind::Pure, "33313", 3},
     {NodeOpCode::Blackbody, OpKind::Pure, "1", 3},
+    {NodeOpCode::Noise, OpKind::Pure, "311111111", 1},
+    {NodeOpCode::Musgrave, OpKind::Pure, "31111111", 1},
+    {NodeOpCode::WhiteNoise, OpKind::Pure, "31", 4},
+    {NodeOpCode::Voronoi, OpKind::Pure, "311111111", 8},
+    {NodeOpCode::Wave, OpKind::Pure, "3111111", 1},
+    {NodeOpCode::Magic, OpKind::Pure, "311", 4},
+    {NodeOpCode::Brick, OpKind::Pure, "33331111111111", 4},
     {NodeOpCode::Diffuse, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glossy, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glass, OpKind::Closure, "33113*", 0},
@@ -112,6 +122,18 @@ constexpr OpLayout kLayouts[] = {
             return op.mode <= static_cast<std::uint16_t>(GradientMode::Spherical);
         case NodeOpCode::VectorTransform:
             return op.mode < 27;
+        case NodeOpCode::Noise:
+            return op.mode <= 0xff && (op.mode >> 2 & 7) < kFractalTypes;
+        case NodeOpCode::Musgrave:
+            return op.mode < 4 * kFractalTypes;
+        case NodeOpCode::WhiteNoise:
+            return op.mode < 4;
+        case NodeOpCode::Voronoi:
+            return op.mode <= 0xff && (op.mode >> 2 & 7) < kCellFeatures;
+        case NodeOpCode::Wave:
+            return (op.mode & ~(kLegacyNoiseBit | 7)) <= 8 * static_cast<int>(WaveProfile::Tri);
+        case NodeOpCode::Magic:
+            return op.mode <= 10;
         case NodeOpCode::VectorRotate:
             return below(op.mode, kInvertBit, 5);
         case NodeOpCode::Glossy:
@@ -133,6 +155,9 @@ constexpr OpLayout kLayouts[] = {
                          op.mode == static_cast<std::uint16_t>(ObjectInfoOutput::Random)) ||
                         (op.code == NodeOpCode::CameraData &&
                          op.mode != static_cast<std::uint16_t>(CameraDataOutput::ViewVector));
+    if (op.code == NodeOpCode::Noise && (op.mode & kColorNoiseBit) != 0) {
+        return 3;
+    }
     return scalar ? 1 : op.code == NodeOpCode::Copy ? op.mode : layout.outputs;
 }
 

@@ -52,6 +52,13 @@ constexpr RunFunction kRun[] = {
     run_vector_transform,
     run_vector_rotate,
     run_blackbody,
+    run_noise,
+    run_musgrave,
+    run_white_noise,
+    run_voronoi,
+    run_wave,
+    run_magic,
+    run_brick,
 };
 
 }  // namespace

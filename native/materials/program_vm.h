@@ -135,6 +135,13 @@ void run_image(const Evaluation& e, const NodeOp& op);
 void run_environment_image(const Evaluation& e, const NodeOp& op);
 void run_checker(const Evaluation& e, const NodeOp& op);
 void run_gradient(const Evaluation& e, const NodeOp& op);
+void run_noise(const Evaluation& e, const NodeOp& op);
+void run_musgrave(const Evaluation& e, const NodeOp& op);
+void run_white_noise(const Evaluation& e, const NodeOp& op);
+void run_voronoi(const Evaluation& e, const NodeOp& op);
+void run_wave(const Evaluation& e, const NodeOp& op);
+void run_magic(const Evaluation& e, const NodeOp& op);
+void run_brick(const Evaluation& e, const NodeOp& op);
 
 // Appends the scattering closures of every hit (index of out) and adds its emission.
 void run_closures(const Evaluation& e, std::span<const NodeOp> ops, ClosureBatch& out);

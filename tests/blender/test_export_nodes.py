@@ -157,13 +157,13 @@ def test_colour_as_shader_emits():
 def test_unknown_nodes_are_named_and_have_their_default():
     owner = _prepared("Strange")
     shader = harness.node(owner, "ShaderNodeBsdfDiffuse")
-    noise = harness.node(owner, "ShaderNodeTexVoronoi")
+    noise = harness.node(owner, "ShaderNodeTexPointDensity")
     harness.connect(owner, noise.outputs["Color"], shader.inputs["Color"])
     harness.connect(owner, shader.outputs[0], harness.surface(owner))
     program = _flattened(owner)
     assert harness.ops_of(program) == ["Diffuse"]
     lines = harness.report()
-    assert any(line.startswith("Strange: ") and "Voronoi" in line for line in lines), lines
+    assert any(line.startswith("Strange: ") and "Point Density" in line for line in lines), lines
 
 
 def test_image_sources():

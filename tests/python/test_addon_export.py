@@ -274,7 +274,7 @@ def test_principled_tables_have_the_native_length():
 
 
 def test_names_of_modes():
-    camel = part("export.node_values")._camel
+    camel = part("export.node_coordinates").camel
     assert camel("MULTIPLY_ADD") == "MultiplyAdd" and camel("ARCTAN2") == "Arctan2"
     assert camel("Linear") == "Linear"
 

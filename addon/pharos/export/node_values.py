@@ -6,12 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .node_coordinates import COORDINATES, camel, uv
+from .node_images import IMAGES
+from .node_textures import TEXTURES
+
 _TABLE_ROWS = 256
-
-
-def _camel(name: str) -> str:
-    """MULTIPLY_ADD as the native side writes it: MultiplyAdd."""
-    return "".join(part.capitalize() for part in name.split("_"))
 
 
 def _rgb(f, node, scope, socket):
@@ -22,169 +21,11 @@ def _value(f, node, scope, socket):
     return f.program.constant(node.outputs[0].default_value)
 
 
-# Coordinates and geometry.
-
-
-def _uv(f, name: str = ""):
-    return f.program.op("Uv", [], 3, f.program.name_index(name))
-
-
-def _coordinate(f, name: str):
-    return f.program.op("Coordinate", [], 3, f.native.CoordinateOutput[name])
-
-
-def _texture_coordinate(f, node, scope, socket):
-    if node.from_instancer:
-        f.unsupported(node, "'From Instancer'")
-    if socket.identifier == "Object" and node.object is not None:
-        f.unsupported(node, "another object's space")
-    if socket.identifier == "UV":
-        return _uv(f)
-    return _coordinate(f, socket.identifier)
-
-
-def _uv_map(f, node, scope, socket):
-    if node.from_instancer:
-        f.unsupported(node, "'From Instancer'")
-    return _uv(f, node.uv_map)
-
-
-_GEOMETRY = {
-    "Position": 3,
-    "Normal": 3,
-    "Tangent": 3,
-    "True Normal": 3,
-    "Incoming": 3,
-    "Parametric": 3,
-    "Backfacing": 1,
-}
-
-
-def _geometry(f, node, scope, socket):
-    size = _GEOMETRY.get(socket.identifier)
-    if size is None:
-        return None
-    mode = f.native.GeometryOutput[socket.identifier.replace(" ", "")]
-    return f.program.op("Geometry", [], size, mode)
-
-
-def _named_output(code: str, enumeration: str, sizes: dict):
-    """A node whose outputs are the modes of one operation."""
-
-    def handler(f, node, scope, socket):
-        name = socket.identifier.replace(" ", "")
-        modes = getattr(f.native, enumeration)
-        if name not in modes:
-            return None
-        return f.program.op(code, [], sizes.get(name, 1), modes[name])
-
-    return handler
-
-
-_light_path_output = _named_output("LightPath", "LightPathOutput", {})
-
-
-def _light_path(f, node, scope, socket):
-    """The renderer does not tell programs how a path came: every hit is a camera ray's."""
-    f.unsupported(node, "telling kinds of rays apart (all count as camera rays)")
-    return _light_path_output(f, node, scope, socket)
-
-
-def _object_info(f, node, scope, socket):
-    modes = f.native.ObjectInfoOutput
-    if socket.identifier not in modes:
-        return None
-    size = 3 if socket.identifier == "Location" else 1
-    return f.program.op("ObjectInfo", [], size, modes[socket.identifier])
-
-
-def _attribute(f, node, scope, socket):
-    """UV maps are the attributes that meshes bring along."""
-    f.unsupported(node, f"read as UV map {node.attribute_name!r}; other attributes")
-    if socket.identifier == "Alpha":
-        return f.program.constant(1.0)
-    value = _uv(f, node.attribute_name)
-    return f.program.op("VectorAverage", [value], 1) if socket.identifier == "Fac" else value
-
-
-def _vector_or(f, node, scope, default):
-    """The Vector input, or a texture's own coordinates."""
-    return f.input(node, scope, "Vector", 3) if f.linked(node, scope, "Vector") else default()
-
-
-def _direction(f):
-    if f.is_world:
-        return _coordinate(f, "Generated")
-    return f.program.op("Geometry", [], 3, f.native.GeometryOutput["Position"])
-
-
-# Textures.
-
-
-def _image_use(f, node, projection: str) -> int:
-    return f.program.add_image_use(
-        image=f.images.index(node.image, node.image_user),
-        interpolation=getattr(f.native.ImageInterpolation, _camel(node.interpolation)),
-        extension=_extension(f, node),
-        projection=getattr(f.native.ImageProjection, _camel(projection)),
-        projection_blend=getattr(node, "projection_blend", 0.0),
-    )
-
-
-def _extension(f, node):
-    name = _camel(getattr(node, "extension", "REPEAT"))
-    extension = getattr(f.native.ImageExtension, name, None)
-    if extension is None:
-        f.unsupported(node, f"extension {node.extension!r}")
-        extension = f.native.ImageExtension.Repeat
-    return extension
-
-
-def _memoised_image(f, node, scope, make):
-    """Colour and alpha of a node share one operation."""
-    key = (scope.path, node.name)
-    if key not in f.image_values:
-        f.image_values[key] = make()
-    return f.image_values[key]
-
-
-def _image(f, node, scope, socket):
-    def make():
-        vector = _vector_or(f, node, scope, lambda: _uv(f))
-        return f.program.op("Image", [vector], 4, _image_use(f, node, node.projection))
-
-    value = _memoised_image(f, node, scope, make)
-    return f.program.component(value, 3) if socket.identifier == "Alpha" else value
-
-
-def _environment(f, node, scope, socket):
-    def make():
-        direction = _vector_or(f, node, scope, lambda: _direction(f))
-        return f.program.op(
-            "EnvironmentImage", [direction], 4, _image_use(f, node, node.projection)
-        )
-
-    return _memoised_image(f, node, scope, make)
-
-
-def _checker(f, node, scope, socket):
-    vector = _vector_or(f, node, scope, lambda: _coordinate(f, "Generated"))
-    colors = [f.input(node, scope, name, 3) for name in ("Color1", "Color2")]
-    value = f.program.op("Checker", [vector, *colors, f.input(node, scope, "Scale", 1)], 4)
-    return f.program.component(value, 3) if socket.identifier == "Fac" else value
-
-
-def _gradient(f, node, scope, socket):
-    vector = _vector_or(f, node, scope, lambda: _coordinate(f, "Generated"))
-    mode = f.native.GradientMode[_camel(node.gradient_type)]
-    return f.program.op("Gradient", [vector], 1, mode)
-
-
 # Arithmetic.
 
 
 def _math(f, node, scope, socket):
-    mode = f.native.MathMode.get(_camel(node.operation))
+    mode = f.native.MathMode.get(camel(node.operation))
     if mode is None:
         return None
     operands = [f.input(node, scope, s.identifier, 1) for s in node.inputs]
@@ -193,7 +34,7 @@ def _math(f, node, scope, socket):
 
 
 def _vector_math(f, node, scope, socket):
-    mode = f.native.VectorMathMode.get(_camel(node.operation))
+    mode = f.native.VectorMathMode.get(camel(node.operation))
     if mode is None:
         return None
     operands = [f.input(node, scope, s.identifier, 3) for s in node.inputs[:3]]
@@ -203,7 +44,7 @@ def _vector_math(f, node, scope, socket):
 
 
 def _mix_mode(f, node, clamp_factor: bool, clamp_result: bool) -> int | None:
-    mode = f.native.BlendMode.get(_camel(node.blend_type))
+    mode = f.native.BlendMode.get(camel(node.blend_type))
     if mode is None:
         return None
     mode |= f.native.CLAMP_FACTOR_BIT if clamp_factor else 0
@@ -257,7 +98,7 @@ def _mix(f, node, scope, socket):
 def _mapping(f, node, scope, socket):
     names = ("Vector", "Location", "Rotation", "Scale")
     operands = [f.input(node, scope, name, 3) for name in names]
-    mode = f.native.MappingMode[_camel(node.vector_type)]
+    mode = f.native.MappingMode[camel(node.vector_type)]
     return f.program.op("Mapping", operands, 3, mode)
 
 
@@ -266,7 +107,7 @@ _SMOOTH = {"SMOOTHSTEP": "SmoothStep", "SMOOTHERSTEP": "SmootherStep"}
 
 def _map_range(f, node, scope, socket):
     mode = f.native.MapRangeMode[
-        _SMOOTH.get(node.interpolation_type) or _camel(node.interpolation_type)
+        _SMOOTH.get(node.interpolation_type) or camel(node.interpolation_type)
     ]
     if node.clamp:
         mode |= f.native.CLAMP_BIT
@@ -286,7 +127,7 @@ def _clamp(f, node, scope, socket):
 
 
 def _vector_rotate(f, node, scope, socket):
-    mode = f.native.VectorRotateMode[_camel(node.rotation_type)]
+    mode = f.native.VectorRotateMode[camel(node.rotation_type)]
     mode |= f.native.INVERT_BIT if node.invert else 0
     operands = [f.input(node, scope, name, 3) for name in ("Vector", "Center", "Axis")]
     operands += [f.input(node, scope, "Angle", 1), f.input(node, scope, "Rotation", 3)]
@@ -403,8 +244,8 @@ def _normal_map(f, node, scope, socket):
         f.unsupported(node, f"space {node.space!r}")
     operands = [f.input(node, scope, "Strength", 1), f.input(node, scope, "Color", 3)]
     if space == "TANGENT" and node.uv_map:
-        operands.append(_uv(f, node.uv_map))
-    return f.program.op("NormalMap", operands, 3, f.native.NormalMapSpace[_camel(space)])
+        operands.append(uv(f, node.uv_map))
+    return f.program.op("NormalMap", operands, 3, f.native.NormalMapSpace[camel(space)])
 
 
 def _bump(f, node, scope, socket):
@@ -423,19 +264,11 @@ def _occlusion(f, node, scope, socket):
 
 
 VALUES = {
+    **COORDINATES,
+    **IMAGES,
+    **TEXTURES,
     "ShaderNodeRGB": _rgb,
     "ShaderNodeValue": _value,
-    "ShaderNodeTexCoord": _texture_coordinate,
-    "ShaderNodeUVMap": _uv_map,
-    "ShaderNodeNewGeometry": _geometry,
-    "ShaderNodeObjectInfo": _object_info,
-    "ShaderNodeCameraData": _named_output("CameraData", "CameraDataOutput", {"ViewVector": 3}),
-    "ShaderNodeLightPath": _light_path,
-    "ShaderNodeAttribute": _attribute,
-    "ShaderNodeTexImage": _image,
-    "ShaderNodeTexEnvironment": _environment,
-    "ShaderNodeTexChecker": _checker,
-    "ShaderNodeTexGradient": _gradient,
     "ShaderNodeMath": _math,
     "ShaderNodeVectorMath": _vector_math,
     "ShaderNodeMixRGB": _mix_rgb,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from .. import compat
 from .node_closures import CLOSURES
 from .node_values import VALUES
 from .program import ProgramBuilder, Value
@@ -33,6 +34,7 @@ class Flattener:
         self.report = report
         self.owner = owner
         self.is_world = is_world
+        self.version = compat.version_number()
         self.program = ProgramBuilder(native)
         self.image_values: dict[tuple, Value] = {}  # image nodes: colour and alpha at once
         self._values: dict[tuple, Value] = {}

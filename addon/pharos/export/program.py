@@ -73,6 +73,12 @@ class ProgramBuilder:
             return self.constant(*value.known[:size])
         return Value(value.operand, size)
 
+    def part(self, value: Value, first: int, size: int) -> Value:
+        """Components of a wider value that begin somewhere in it."""
+        if value.known is not None:
+            return self.constant(*value.known[first : first + size])
+        return Value(value.operand + first, size)
+
     def to_scalar(self, value: Value, is_color: bool) -> Value:
         """A colour becomes its luminance, a vector the mean of its components."""
         if value.size == 1:

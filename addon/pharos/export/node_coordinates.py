@@ -1,0 +1,118 @@
+"""Nodes that tell where a hit is: coordinates, geometry, object, camera, path. Handlers as in
+node_values.
+"""
+
+from __future__ import annotations
+
+
+def camel(name: str) -> str:
+    """MULTIPLY_ADD as the native side writes it: MultiplyAdd."""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def uv(f, name: str = ""):
+    return f.program.op("Uv", [], 3, f.program.name_index(name))
+
+
+def coordinate(f, name: str):
+    return f.program.op("Coordinate", [], 3, f.native.CoordinateOutput[name])
+
+
+def _texture_coordinate(f, node, scope, socket):
+    if node.from_instancer:
+        f.unsupported(node, "'From Instancer'")
+    if socket.identifier == "Object" and node.object is not None:
+        f.unsupported(node, "another object's space")
+    if socket.identifier == "UV":
+        return uv(f)
+    return coordinate(f, socket.identifier)
+
+
+def _uv_map(f, node, scope, socket):
+    if node.from_instancer:
+        f.unsupported(node, "'From Instancer'")
+    return uv(f, node.uv_map)
+
+
+_GEOMETRY = {
+    "Position": 3,
+    "Normal": 3,
+    "Tangent": 3,
+    "True Normal": 3,
+    "Incoming": 3,
+    "Parametric": 3,
+    "Backfacing": 1,
+}
+
+
+def _geometry(f, node, scope, socket):
+    size = _GEOMETRY.get(socket.identifier)
+    if size is None:
+        return None
+    mode = f.native.GeometryOutput[socket.identifier.replace(" ", "")]
+    return f.program.op("Geometry", [], size, mode)
+
+
+def _named_output(code: str, enumeration: str, sizes: dict):
+    """A node whose outputs are the modes of one operation."""
+
+    def handler(f, node, scope, socket):
+        name = socket.identifier.replace(" ", "")
+        modes = getattr(f.native, enumeration)
+        if name not in modes:
+            return None
+        return f.program.op(code, [], sizes.get(name, 1), modes[name])
+
+    return handler
+
+
+_light_path_output = _named_output("LightPath", "LightPathOutput", {})
+
+
+def _light_path(f, node, scope, socket):
+    """The renderer does not tell programs how a path came: every hit is a camera ray's."""
+    f.unsupported(node, "telling kinds of rays apart (all count as camera rays)")
+    return _light_path_output(f, node, scope, socket)
+
+
+def _object_info(f, node, scope, socket):
+    modes = f.native.ObjectInfoOutput
+    if socket.identifier not in modes:
+        return None
+    size = 3 if socket.identifier == "Location" else 1
+    return f.program.op("ObjectInfo", [], size, modes[socket.identifier])
+
+
+def _attribute(f, node, scope, socket):
+    """UV maps are the attributes that meshes bring along."""
+    f.unsupported(node, f"read as UV map {node.attribute_name!r}; other attributes")
+    if socket.identifier == "Alpha":
+        return f.program.constant(1.0)
+    value = uv(f, node.attribute_name)
+    return f.program.op("VectorAverage", [value], 1) if socket.identifier == "Fac" else value
+
+
+def vector_or(f, node, scope, default):
+    """The Vector input, or a texture's own coordinates."""
+    return f.input(node, scope, "Vector", 3) if f.linked(node, scope, "Vector") else default()
+
+
+def direction(f):
+    if f.is_world:
+        return coordinate(f, "Generated")
+    return f.program.op("Geometry", [], 3, f.native.GeometryOutput["Position"])
+
+
+def vector_or_generated(f, node, scope):
+    return vector_or(f, node, scope, lambda: coordinate(f, "Generated"))
+
+
+COORDINATES = {
+    "ShaderNodeTexCoord": _texture_coordinate,
+    "ShaderNodeUVMap": _uv_map,
+    "ShaderNodeNewGeometry": _geometry,
+    "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeCameraData": _named_output("CameraData", "CameraDataOutput", {"ViewVector": 3}),
+    "ShaderNodeLightPath": _light_path,
+    "ShaderNodeAttribute": _attribute,
+}
