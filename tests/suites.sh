@@ -1,5 +1,5 @@
-# The suites of tests/run; sourced. Each adds to suite_passed, suite_failed and suite_skipped, and
-# keeps what its program said in build/tests/NAME.log.
+# The suites of tests/run; sourced. Each adds to suite_passed, suite_failed and suite_skipped, keeps
+# what its program said in build/tests/NAME.log, and tells blame what failed.
 
 LOGS=$PHAROS_ROOT/build/tests
 PYTHON=$PHAROS_ROOT/build/bpy/bin/python
@@ -24,6 +24,19 @@ count() {
     suite_skipped=$((suite_skipped + ${3:-0}))
 }
 
+# blame TEXT: a failed test's name and the beginning of what it said, repeated by tests/run at its end.
+blame() {
+    blamed+=("$(tr -s '\n\t ' ' ' <<<"$suite: $1" | cut -c 1-320)")
+}
+
+# Reads one such text a line.
+blame_lines() {
+    local line
+    while IFS= read -r line; do
+        [ -z "$line" ] || blame "$line"
+    done
+}
+
 # logged NAME SECONDS COMMAND...: runs it within the time, all it says goes to build/tests/NAME.log.
 logged() {
     local name=$1 seconds=$2
@@ -40,6 +53,7 @@ check() {
         count 0 1
         printf -- '--- %s failed:\n' "$1"
         tail -n 25 "$LOGS/$1.log"
+        blame "$1: $(grep -aE 'error|Error|warning' "$LOGS/$1.log" | head -n 3)"
     fi
 }
 
@@ -64,6 +78,8 @@ counted() {
         printf -- '--- %s (status %s):\n' "$name" "$status"
         grep -aE 'FAIL|Error|error:|assert' "$LOGS/$name.log" | head -n 25
         tail -n 10 "$LOGS/$name.log"
+        blame_lines < <(grep -aE '^ *FAIL(ED)?\b' "$LOGS/$name.log" | sort -u |
+            grep . || echo "$name: status $status, $(tail -n 2 "$LOGS/$name.log")")
     fi
 }
 
@@ -76,9 +92,13 @@ run_ctest() {
     (cd "$PHAROS_ROOT" && logged "$name" "$seconds" ctest --preset "$preset" -j 2 --output-junit "$report" "$@")
     status=$?
     if [ -f "$report" ]; then
-        count $("$PYTHON" "$PHAROS_ROOT/tests/read_junit.py" "$report")
+        local read_report
+        read_report=$("$PYTHON" "$PHAROS_ROOT/tests/read_junit.py" "$report")
+        count $(head -n 1 <<<"$read_report")
+        blame_lines < <(tail -n +2 <<<"$read_report")
     else
         count 0 1
+        blame "ctest ended without a report (status $status)"
         printf -- '--- %s ended without a report (status %s):\n' "$name" "$status"
         tail -n 25 "$LOGS/$name.log"
     fi
@@ -90,6 +110,7 @@ run_ctest() {
 build_or_fail() {
     build_preset "$@" && return
     count 0 1
+    blame "the build of $1 broke"
     return 1
 }
 

@@ -90,13 +90,17 @@ def run(host: str, script: Path, env: dict[str, str]) -> tuple[int, int, int]:
         len(re.findall(rf"^{word} ", text, re.MULTILINE)) for word in ("PASS", "FAIL", "SKIP")
     ]
     broken = (code != 0 and not counts[1]) or not any(counts)
+    lines = re.findall(r"^(?:FAIL|SKIP|MEASURED) .*$", text, re.MULTILINE)
     if broken:
         counts[1] += 1
+        last = text.strip().splitlines()[-1:] or ["it said nothing"]
+        lines.append(f"FAIL {script.stem}: exit code {code}, {last[0][:200]}")
     say(f"{title}: {counts[0]} passed, {counts[1]} failed, {time.monotonic() - began:.1f} s")
     if counts[1]:
-        say(f"--- exit code {code}; output:\n{text[-6000:]}\n---")
-    for line in re.findall(r"^(?:FAIL|SKIP|MEASURED) .*$", text, re.MULTILINE):
-        say(f"  {line}")
+        output = text[-6000:].replace("\n", "\n| ")
+        say(f"--- exit code {code}; output:\n| {output}\n---")
+    for line in lines:
+        say(f"  {line} [{host}]")
     return tuple(counts)
 
 
