@@ -9,6 +9,7 @@ VERSION = bpy.app.version
 _FLAT_PASSES = VERSION >= (4, 0, 0)
 _CORNER_NORMALS = VERSION >= (4, 1, 0)
 _FAST_ATTRIBUTES = VERSION >= (3, 6, 0)
+SHORT_PASS_NAMES = VERSION < (5, 0, 0)
 
 
 def version_number() -> int:

@@ -6,7 +6,8 @@ import traceback
 
 import bpy
 
-from . import final, native, output
+from . import final, native
+from .passes import wanted_passes
 from .viewport import Viewport
 
 
@@ -37,8 +38,11 @@ class PharosRenderEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene=None, renderlayer=None):
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for _, name, _, channels, kind in wanted_passes(renderlayer):
-            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+        for entry in wanted_passes(renderlayer):
+            channels = entry.channels
+            self.register_pass(
+                scene, renderlayer, entry.blender_name, len(channels), channels, entry.kind
+            )
 
     def render(self, depsgraph):
         module, problem = native.load()
@@ -46,9 +50,9 @@ class PharosRenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, f"Pharos: {problem}")
             return
         layer = depsgraph.view_layer_eval
-        for _, name, _, channels, _ in wanted_passes(layer):
-            if name not in _BUILT_IN:
-                self.add_pass(name, len(channels), channels, layer=layer.name)
+        for entry in wanted_passes(layer):
+            if not entry.built_in:
+                self.add_pass(entry.name, len(entry.channels), entry.channels, layer=layer.name)
         try:
             final.render(self, depsgraph, module)
         except Exception as error:  # whatever it was, the user must see it
@@ -73,24 +77,6 @@ class PharosRenderEngine(bpy.types.RenderEngine):
         if getattr(self, "_viewport", None) is None:
             self._viewport = Viewport(module)
         return self._viewport
-
-
-_BUILT_IN = {"Combined", "Depth", "Normal"}
-
-
-def wanted_passes(view_layer):
-    """Passes beside Combined that a view layer asks for."""
-    switches = {
-        "Depth": view_layer.use_pass_z,
-        "Normal": view_layer.use_pass_normal,
-    }
-    cycles = getattr(view_layer, "cycles", None)
-    denoising = getattr(cycles, "denoising_store_passes", False)
-    own = view_layer.pharos
-    switches["DenoisingNormal"] = switches["DenoisingAlbedo"] = denoising or own.use_pass_denoising
-    counts = getattr(cycles, "pass_debug_sample_count", False)
-    switches["SampleCount"] = counts or own.use_pass_sample_count
-    return [entry for entry in output.PASSES if switches.get(entry[0], False)]
 
 
 def register():

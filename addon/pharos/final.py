@@ -15,6 +15,7 @@ from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
 from .export.scene import export_scene, set_view
+from .passes import PASSES, PassRequest, wanted_passes
 
 _POLL = 0.05  # seconds between looks at the session and at Blender's Esc
 _FIRST_RESULT = 0.1
@@ -100,6 +101,7 @@ class FinalRender:
             self._report,
             self._should_stop,
             lambda name: engine.update_stats("", f"Exporting {name}"),
+            PassRequest(wanted_passes(self._layer)),
         )
         override = (engine.camera_model_matrix(camera), engine.camera_shift_x(camera))
         fields = camera_fields(self._native, camera, frame, self._report, override)
@@ -149,11 +151,11 @@ class FinalRender:
 
     def _show_result(self, session, result) -> None:
         passes = result.layers[0].passes
-        for name, blender_name, _, _, _ in output.PASSES:
-            render_pass = passes.get(blender_name)
+        for entry in PASSES:
+            render_pass = passes.get(entry.blender_name)
             if render_pass is None:
                 continue
-            pixels = output.read_pass(self._native, session, name)
+            pixels = output.read_pass(self._native, session, entry.film_pass)
             if pixels is not None:
                 compat.set_pass_pixels(render_pass, pixels)
         self._engine.update_result(result)
@@ -181,14 +183,24 @@ class FinalRender:
             handlers.post_report(self._scene.name, self._report.entries)
 
 
+def guide_words(guide) -> str:
+    """What the guide does: its share and loss, or why it is off; empty where nobody asked."""
+    if not guide.enabled:
+        return ""
+    why = guide.why_unguided
+    doing = f"Guiding {why}" if why else f"Guiding {100 * guide.guided_share:.0f} % of vertices"
+    return f"{doing}, loss {guide.held_out_loss:.3f}" if guide.snapshots else doing
+
+
 def stats_line(progress) -> str:
     parts = [f"Sample {progress.samples}/{progress.total_samples}"]
     if progress.remaining > 0.0:
         parts.append(f"{progress.remaining:.1f} s left")
     parts.append(f"Noise {progress.noise:.3g}")
+    parts.append(guide_words(progress.guiding))
     if progress.nonfinite_samples:
         parts.append(f"{progress.nonfinite_samples} samples dropped")
-    return " | ".join(parts)
+    return " | ".join(part for part in parts if part)
 
 
 def render(engine, depsgraph, native) -> None:

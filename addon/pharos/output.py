@@ -8,19 +8,11 @@ import time
 
 import numpy as np
 
-# Film pass, name in Blender's render result, name in our own EXR files, channels, kind of the pass.
-PASSES = (
-    ("Combined", "Combined", "Combined", "RGBA", "COLOR"),
-    ("Depth", "Depth", "Depth", "Z", "VALUE"),
-    ("Normal", "Normal", "Normal", "XYZ", "VECTOR"),
-    ("DenoisingNormal", "Denoising Normal", "Denoising Normal", "XYZ", "VECTOR"),
-    ("DenoisingAlbedo", "Denoising Albedo", "Denoising Albedo", "RGB", "COLOR"),
-    ("SampleCount", "Debug Sample Count", "Debug Sample Count", "X", "VALUE"),
-)
+from .passes import PASSES
 
 
 def read_pass(native, session, name: str) -> np.ndarray | None:
-    """Pixels (n, channels) of a film pass, bottom row first; None while there is no picture."""
+    """Pixels (n, channels) of a film pass, bottom row first; None without picture or pass."""
     film_pass = getattr(native.FilmPass, name)
     pixels = np.empty(
         (session.width * session.height, native.film_pass_channels(film_pass)), np.float32
@@ -31,10 +23,10 @@ def read_pass(native, session, name: str) -> np.ndarray | None:
 def write_partial(native, session, path: str) -> bool:
     """The picture as far as it has come, as an EXR file."""
     passes = []
-    for name, _, exr_name, channels, _ in PASSES:
-        pixels = read_pass(native, session, name)
+    for entry in PASSES:
+        pixels = read_pass(native, session, entry.film_pass)
         if pixels is not None:
-            passes.append((exr_name, channels, pixels))
+            passes.append((entry.name, entry.channels, pixels))
     if not passes:
         return False
     native.write_exr(path, session.width, session.height, passes)

@@ -50,7 +50,6 @@ _EXCLUDED = {
     "WORLD_PT_environment_lighting",
     "WORLD_PT_gather",
     "WORLD_PT_indirect_lighting",
-    "WORLD_PT_mist",
     "WORLD_PT_preview",
     "WORLD_PT_world",
 }
@@ -59,6 +58,7 @@ _ADOPTED = {
     "DATA_PT_camera_dof",
     "DATA_PT_camera_dof_aperture",
     "DATA_PT_lens",
+    "EEVEE_WORLD_PT_mist",
     "MATERIAL_PT_preview",
     "WORLD_PT_preview",
     "RENDER_PT_color_management",
@@ -77,6 +77,14 @@ class _PharosPanel:
 
 class _RenderPanel(_PharosPanel):
     bl_context = "render"
+
+
+def _settings_layout(panel):
+    """A panel's layout as columns of names and values."""
+    layout = panel.layout
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
 
 
 class PHAROS_RENDER_PT_problem(_RenderPanel, bpy.types.Panel):
@@ -105,9 +113,7 @@ class PHAROS_RENDER_PT_sampling(_RenderPanel, bpy.types.Panel):
     bl_label = "Sampling"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_layout(self)
         settings = context.scene.pharos
         layout.prop(settings, "follow_cycles")
         own = layout.column()
@@ -116,7 +122,20 @@ class PHAROS_RENDER_PT_sampling(_RenderPanel, bpy.types.Panel):
         own.prop(settings, "preview_samples", text="Viewport")
         own.prop(settings, "seed")
         layout.prop(settings, "time_limit")
-        layout.prop(settings, "guiding")
+        layout.prop(settings, "use_guiding")
+
+
+class PHAROS_RENDER_PT_advanced(_RenderPanel, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "PHAROS_RENDER_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = _settings_layout(self)
+        settings = context.scene.pharos
+        mode = layout.column()
+        mode.active = settings.use_guiding
+        mode.prop(settings, "guiding_mode")
         layout.prop(settings, "use_nee")
 
 
@@ -125,9 +144,7 @@ class PHAROS_RENDER_PT_bounces(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_layout(self)
         settings = context.scene.pharos
         layout.active = not settings.follow_cycles
         column = layout.column(align=True)
@@ -143,9 +160,7 @@ class PHAROS_RENDER_PT_film(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_layout(self)
         settings = context.scene.pharos
         own = layout.column()
         own.active = not settings.follow_cycles
@@ -161,9 +176,7 @@ class PHAROS_RENDER_PT_performance(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_layout(self)
         render = context.scene.render
         layout.prop(render, "threads_mode")
         if render.threads_mode == "FIXED":
@@ -194,17 +207,34 @@ class PHAROS_RENDER_PT_report(_RenderPanel, bpy.types.Panel):
 class PHAROS_VIEW_LAYER_PT_passes(_PharosPanel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
+    _SWITCHES = (
+        (
+            "Data",
+            (
+                ("use_pass_z", "Depth"),
+                ("use_pass_mist", "Mist"),
+                ("use_pass_position", "Position"),
+                ("use_pass_normal", "Normal"),
+                ("use_pass_uv", "UV"),
+            ),
+        ),
+        ("Indexes", (("use_pass_object_index", "Object"), ("use_pass_material_index", "Material"))),
+        ("Light", (("use_pass_emit", "Emission"), ("use_pass_environment", "Environment"))),
+    )
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_layout(self)
         view_layer = context.view_layer
-        column = layout.column(heading="Data", align=True)
-        column.prop(view_layer, "use_pass_z", text="Depth")
-        column.prop(view_layer, "use_pass_normal", text="Normal")
+        for heading, switches in self._SWITCHES:
+            column = layout.column(heading=heading, align=True)
+            for switch, text in switches:
+                column.prop(view_layer, switch, text=text)
+        column = layout.column(heading="Sampling", align=True)
         column.prop(view_layer.pharos, "use_pass_denoising")
         column.prop(view_layer.pharos, "use_pass_sample_count")
+        column = layout.column(heading="Path Guiding", align=True)
+        for name in ("direction", "kappa", "irradiance", "share"):
+            column.prop(view_layer.pharos, f"use_pass_guide_{name}")
 
 
 def draw_node_socket(layout, owner, output_type: str, socket: str) -> None:
@@ -251,42 +281,53 @@ class PHAROS_MATERIAL_PT_slots(_PharosPanel, bpy.types.Panel):
             row.prop(slot, "link", text="")
 
 
-class PHAROS_MATERIAL_PT_surface(_PharosPanel, bpy.types.Panel):
+class _TreePanel(_PharosPanel):
+    """The node tree behind an output, or what stands for it without nodes."""
+
     bl_label = "Surface"
+    owner_name = ""  # attribute of the context
+    output_type = ""
+    plain = ("", {})  # property shown without nodes
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and getattr(context, cls.owner_name) is not None
+
+    def draw(self, context):
+        layout, owner = self.layout, getattr(context, self.owner_name)
+        layout.prop(owner, "use_nodes", icon="NODETREE")
+        layout.separator()
+        name, options = self.plain
+        if owner.use_nodes:
+            draw_node_socket(layout, owner, self.output_type, "Surface")
+        elif name:
+            layout.use_property_split = True
+            layout.prop(owner, name, **options)
+
+
+class PHAROS_MATERIAL_PT_surface(_TreePanel, bpy.types.Panel):
     bl_context = "material"
+    owner_name, output_type = "material", "Material Output"
+    plain = ("diffuse_color", {"text": "Base Color"})
+
+
+class PHAROS_MATERIAL_PT_settings(_PharosPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_context = "material"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
         return super().poll(context) and context.material is not None
 
     def draw(self, context):
-        layout, material = self.layout, context.material
-        layout.prop(material, "use_nodes", icon="NODETREE")
-        layout.separator()
-        if material.use_nodes:
-            draw_node_socket(layout, material, "Material Output", "Surface")
-        else:
-            layout.use_property_split = True
-            layout.prop(material, "diffuse_color", text="Base Color")
+        _settings_layout(self).prop(context.material, "pass_index")
 
 
-class PHAROS_WORLD_PT_surface(_PharosPanel, bpy.types.Panel):
-    bl_label = "Surface"
+class PHAROS_WORLD_PT_surface(_TreePanel, bpy.types.Panel):
     bl_context = "world"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.world is not None
-
-    def draw(self, context):
-        layout, world = self.layout, context.world
-        layout.prop(world, "use_nodes", icon="NODETREE")
-        layout.separator()
-        if world.use_nodes:
-            draw_node_socket(layout, world, "World Output", "Surface")
-        else:
-            layout.use_property_split = True
-            layout.prop(world, "color")
+    owner_name, output_type = "world", "World Output"
+    plain = ("color", {})
 
 
 class PHAROS_LIGHT_PT_light(_PharosPanel, bpy.types.Panel):
@@ -340,19 +381,10 @@ class PHAROS_LIGHT_PT_light(_PharosPanel, bpy.types.Panel):
             column.prop(settings, "use_multiple_importance_sampling", text="Multiple Importance")
 
 
-class PHAROS_LIGHT_PT_nodes(_PharosPanel, bpy.types.Panel):
+class PHAROS_LIGHT_PT_nodes(_TreePanel, bpy.types.Panel):
     bl_label = "Nodes"
     bl_context = "data"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.light is not None
-
-    def draw(self, context):
-        layout, light = self.layout, context.light
-        layout.prop(light, "use_nodes", icon="NODETREE")
-        if light.use_nodes:
-            draw_node_socket(layout, light, "Light Output", "Surface")
+    owner_name, output_type = "light", "Light Output"
 
 
 class PHAROS_OBJECT_PT_visibility(_PharosPanel, bpy.types.Panel):
@@ -375,6 +407,7 @@ class PHAROS_OBJECT_PT_visibility(_PharosPanel, bpy.types.Panel):
 _CLASSES = (
     PHAROS_RENDER_PT_problem,
     PHAROS_RENDER_PT_sampling,
+    PHAROS_RENDER_PT_advanced,
     PHAROS_RENDER_PT_bounces,
     PHAROS_RENDER_PT_film,
     PHAROS_RENDER_PT_performance,
@@ -382,6 +415,7 @@ _CLASSES = (
     PHAROS_VIEW_LAYER_PT_passes,
     PHAROS_MATERIAL_PT_slots,
     PHAROS_MATERIAL_PT_surface,
+    PHAROS_MATERIAL_PT_settings,
     PHAROS_WORLD_PT_surface,
     PHAROS_LIGHT_PT_light,
     PHAROS_LIGHT_PT_nodes,

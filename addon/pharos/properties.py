@@ -12,6 +12,11 @@ from bpy.props import (
 )
 
 _MAX_SEED = 2**31 - 1
+_GUIDING_DEFAULT = "OFF"
+_GUIDING_MODES = (
+    ("NEURAL", "Neural", "A small network learns while it renders"),
+    ("SLIDES", "Single Lobe", "One lobe a point, for comparison"),
+)
 
 
 class PharosReportEntry(bpy.types.PropertyGroup):
@@ -29,24 +34,46 @@ class PharosReportEntry(bpy.types.PropertyGroup):
     message: StringProperty(name="Message")
 
 
-class PharosSceneSettings(bpy.types.PropertyGroup):
-    """How Pharos renders a scene."""
+def _bounces(name: str, description: str, default: int = 12):
+    return IntProperty(name=name, description=description, default=default, min=0, max=1024)
 
-    samples: IntProperty(
-        name="Samples",
-        description="Samples of each pixel in a final render",
-        default=128,
-        min=1,
+
+def _samples(name: str, description: str, default: int, least: int):
+    return IntProperty(
+        name=name,
+        description=description,
+        default=default,
+        min=least,
         max=1 << 24,
         soft_max=65536,
     )
-    preview_samples: IntProperty(
-        name="Viewport Samples",
-        description="Samples of each pixel in the viewport; 0 goes on without end",
-        default=1024,
-        min=0,
-        max=1 << 24,
-        soft_max=65536,
+
+
+def _pass_switch(name: str, description: str):
+    return BoolProperty(name=name, description=description, default=False)
+
+
+def _guiding_changed(settings, _context) -> None:
+    """The switch remembers how it was on."""
+    if settings.guiding not in {"OFF", settings.guiding_mode}:
+        settings.guiding_mode = settings.guiding
+
+
+def _guiding_mode_changed(settings, _context) -> None:
+    if settings.guiding not in {"OFF", settings.guiding_mode}:
+        settings.guiding = settings.guiding_mode
+
+
+def _switch_guiding(settings, on: bool) -> None:
+    settings.guiding = settings.guiding_mode if on else "OFF"
+
+
+class PharosSceneSettings(bpy.types.PropertyGroup):
+    """How Pharos renders a scene."""
+
+    samples: _samples("Samples", "Samples of each pixel in a final render", 128, 1)
+    preview_samples: _samples(
+        "Viewport Samples", "Samples of each pixel in the viewport; 0 goes on without end", 1024, 0
     )
     seed: IntProperty(
         name="Seed",
@@ -73,39 +100,30 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
     guiding: EnumProperty(
         name="Path Guiding",
         description="How the directions of light paths are led to where the light is",
-        items=(
-            ("OFF", "Off", "Directions follow the materials alone"),
-            ("NEURAL", "Neural", "A small network learns while it renders"),
-            ("SLIDES", "Single Lobe", "One lobe a point, for comparison"),
-        ),
-        default="OFF",
+        items=(("OFF", "Off", "Directions follow the materials alone"), *_GUIDING_MODES),
+        default=_GUIDING_DEFAULT,
+        update=_guiding_changed,
     )
-    max_bounces: IntProperty(
-        name="Total",
-        description="Most bounces of a light path; 0 is direct light only",
-        default=12,
-        min=0,
-        max=1024,
+    use_guiding: BoolProperty(
+        name="Path Guiding",
+        description="Learn where the light is while rendering and send paths there, wherever that "
+        "gains. Scenes lit indirectly or through small openings come out clean much sooner",
+        get=lambda settings: settings.guiding != "OFF",
+        set=_switch_guiding,
     )
-    diffuse_bounces: IntProperty(
-        name="Diffuse", description="Most diffuse reflections", default=12, min=0, max=1024
+    guiding_mode: EnumProperty(
+        name="Guide",
+        description="What learns where the light is",
+        items=_GUIDING_MODES,
+        default="NEURAL",
+        update=_guiding_mode_changed,
     )
-    glossy_bounces: IntProperty(
-        name="Glossy", description="Most glossy reflections", default=12, min=0, max=1024
-    )
-    transmission_bounces: IntProperty(
-        name="Transmission",
-        description="Most bounces through a surface",
-        default=12,
-        min=0,
-        max=1024,
-    )
-    transparent_bounces: IntProperty(
-        name="Transparent",
-        description="Most transparent surfaces that a straight path crosses",
-        default=8,
-        min=0,
-        max=1024,
+    max_bounces: _bounces("Total", "Most bounces of a light path; 0 is direct light only")
+    diffuse_bounces: _bounces("Diffuse", "Most diffuse reflections")
+    glossy_bounces: _bounces("Glossy", "Most glossy reflections")
+    transmission_bounces: _bounces("Transmission", "Most bounces through a surface")
+    transparent_bounces: _bounces(
+        "Transparent", "Most transparent surfaces that a straight path crosses", 8
     )
     caustics_reflective: BoolProperty(
         name="Reflective Caustics",
@@ -157,15 +175,25 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
 class PharosViewLayerSettings(bpy.types.PropertyGroup):
     """Passes that Blender has no switches for."""
 
-    use_pass_denoising: BoolProperty(
-        name="Denoising Data",
-        description="Deliver the normal and albedo passes that denoisers take",
-        default=False,
+    use_pass_denoising: _pass_switch(
+        "Denoising Data", "Deliver the normal and albedo passes that denoisers take"
     )
-    use_pass_sample_count: BoolProperty(
-        name="Sample Count",
-        description="Deliver the number of samples of each pixel",
-        default=False,
+    use_pass_sample_count: _pass_switch(
+        "Sample Count", "Deliver the number of samples of each pixel"
+    )
+    use_pass_guide_direction: _pass_switch(
+        "Direction", "Deliver the mean direction of the light that the guide has learned"
+    )
+    use_pass_guide_kappa: _pass_switch(
+        "Kappa", "Deliver how concentrated the learned light is: 0 comes from everywhere alike"
+    )
+    use_pass_guide_irradiance: _pass_switch(
+        "Irradiance", "Deliver A, the learned light of all directions together"
+    )
+    use_pass_guide_share: _pass_switch(
+        "Share",
+        "Deliver the share of directions that follows the guide; the rest, the BSDF's share, "
+        "follows the material",
     )
 
 

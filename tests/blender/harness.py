@@ -217,6 +217,58 @@ def render(name: str = "render") -> np.ndarray:
     return read_exr(path)
 
 
+def _attributes(data: bytes) -> tuple[dict[str, bytes], int]:
+    """Attributes of an EXR header, and where the table of lines begins."""
+    place, found = 8, {}
+    while data[place]:
+        words = data[place : place + 300].split(b"\0", 2)
+        place += len(words[0]) + len(words[1]) + 2
+        size = int.from_bytes(data[place : place + 4], "little")
+        found[words[0].decode()] = data[place + 4 : place + 4 + size]
+        place += 4 + size
+    return found, place + 1
+
+
+def read_channels(path) -> dict[str, np.ndarray]:
+    """Channels of an uncompressed float EXR by their full names, bottom row first."""
+    data = Path(path).read_bytes()
+    header, place = _attributes(data)
+    names, listed = [], header["channels"]
+    while listed[0]:
+        name, listed = listed.split(b"\0", 1)
+        names.append(name.decode())
+        listed = listed[16:]
+    x0, y0, x1, y1 = np.frombuffer(header["dataWindow"], "<i4")
+    width, height = int(x1 - x0 + 1), int(y1 - y0 + 1)
+    lines = np.empty((height, len(names), width), np.float32)
+    for offset in np.frombuffer(data, "<u8", height, place):
+        y = int(np.frombuffer(data, "<i4", 1, int(offset))[0]) - y0
+        row = np.frombuffer(data, "<f4", len(names) * width, int(offset) + 8)
+        lines[y] = row.reshape(len(names), width)
+    return {name: lines[::-1, i] for i, name in enumerate(names)}
+
+
+def render_layers(name: str = "layers") -> dict[str, np.ndarray]:
+    """Render to a multilayer EXR; its channels by name, without the view layer's name."""
+    scene = bpy.context.scene
+    path = TEMPORARY / f"{name}.exr"
+    path.unlink(missing_ok=True)
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    settings.exr_codec = "NONE"
+    scene.render.filepath = str(path)
+    try:
+        bpy.ops.render.render(write_still=True)
+    finally:
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        settings.file_format = "OPEN_EXR"
+    prefix = f"{bpy.context.view_layer.name}."
+    return {key.removeprefix(prefix): value for key, value in read_channels(path).items()}
+
+
 def close(a, b, tolerance: float = 1e-6) -> bool:
     return bool(np.allclose(np.asarray(a), np.asarray(b), rtol=0.0, atol=tolerance))
 

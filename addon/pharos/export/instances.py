@@ -84,9 +84,11 @@ class InstanceExporter:
             return
         self._visibility.name_unsupported(obj)
         material_set, uses_uv = self._context.materials.set_of(obj)
-        mesh = self._mesh_index(obj, uses_uv)
+        passes = self._context.passes
+        mesh = self._mesh_index(obj, uses_uv or passes.needs_uv)
         if mesh is not None:
             self._names.append(obj.name)
+            passes.object_indices.append(obj.pass_index)
             self._rows.append((place, mesh, material_set, bits))
 
     def _mesh_index(self, obj, uses_uv: bool) -> int | None:

@@ -17,6 +17,7 @@ class MaterialTable:
         self._override = override
         self._materials: dict[int, tuple[int, bool]] = {}
         self._sets: dict[tuple[int, ...], int] = {}
+        self.pass_indices: list[int] = []  # of each material added
 
     def _material(self, material) -> tuple[int, bool]:
         """Index and whether UV maps are needed."""
@@ -31,6 +32,7 @@ class MaterialTable:
                 emission_sampling=compat.material_samples_emission(material),
             )
             self._materials[key] = index, flat.uses_uv
+            self.pass_indices.append(material.pass_index)
         return self._materials[key]
 
     def set_of(self, obj) -> tuple[int, bool]:

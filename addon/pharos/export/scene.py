@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import compat
+from ..passes import PassRequest
 from .camera import View
 from .images import ImageTable
 from .instances import InstanceExporter
@@ -28,6 +29,7 @@ class ExportContext:
     report: Report
     should_stop: Callable[[], bool]
     progress: Callable[[str], None]
+    passes: PassRequest
     images: Any = None
     materials: Any = None
 
@@ -45,19 +47,30 @@ def export_scene(
     report: Report,
     should_stop: Callable[[], bool] = lambda: False,
     progress: Callable[[str], None] = lambda name: None,
+    passes: PassRequest | None = None,
 ):
     """A description of everything but the view. Raises instances.Cancelled."""
     scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     description = native.SceneDescription(compat.version_number())
     context = ExportContext(
-        native, depsgraph, scene, view_layer, description, report, should_stop, progress
+        native,
+        depsgraph,
+        scene,
+        view_layer,
+        description,
+        report,
+        should_stop,
+        progress,
+        passes or PassRequest(),
     )
     context.images = ImageTable(native, description, report)
     context.materials = MaterialTable(
         native, description, context.images, report, view_layer.material_override
     )
+    context.passes.material_indices = context.materials.pass_indices
     description.set_settings(**render_settings(native, scene, view_layer))
     InstanceExporter(context).run()
     export_world(context)
+    description.set_passes(**context.passes.fields(native, scene.world))
     name_ignored_settings(scene, report)
     return description

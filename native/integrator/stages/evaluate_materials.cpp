@@ -1,6 +1,7 @@
 #include <numeric>
 
 #include "integrator/stages.h"
+#include "integrator/surface_alpha.h"
 
 namespace pharos {
 
@@ -81,7 +82,9 @@ void write_features(const RenderContext& context, PathBatch& batch) {
         }
         FilmSample& sample = batch.root_sample[batch.root[path]];
         const SurfaceInteraction& surface = batch.surfaces[s];
-        if (counters.depth == 0) {
+        const Material& material = context.scene.materials[surface.material];
+        if (counters.from_camera && sample.depth == FilmSample{}.depth &&
+            is_shown(surface_alpha(material, batch.bsdfs[s]))) {
             sample.depth = context.camera.depth(surface.p);
             sample.normal = surface.ns;
         }

@@ -1,11 +1,11 @@
 #include "core/color.h"
 #include "integrator/stages.h"
+#include "integrator/surface_alpha.h"
 
 namespace pharos {
 
 namespace {
 
-constexpr float kOpaque = 0.5f;  // least alpha of the surface that a pass of one surface shows
 constexpr std::uint32_t kSingleSurface = pass_bit(FilmPass::Position) |
                                          pass_bit(FilmPass::ObjectIndex) |
                                          pass_bit(FilmPass::MaterialIndex);
@@ -40,16 +40,6 @@ void set(const RenderContext& context,
     if (context.passes.wants(pass)) {
         *place(context, pass, path, batch) = static_cast<float>(value);
     }
-}
-
-[[nodiscard]] Rgb opacity(const Bsdf& bsdf) {
-    Rgb transparency(0.0f);
-    for (const Closure& closure : bsdf.closures) {
-        if (closure.type == ClosureType::Transparent) {
-            transparency += closure.weight;
-        }
-    }
-    return glm::clamp(Rgb(1.0f) - transparency, 0.0f, 1.0f);
 }
 
 // Third component 1 where the mesh has a map.
@@ -92,10 +82,9 @@ void write_surface(const RenderContext& context,
                    PathBatch& batch) {
     const PassLayout& passes = context.passes;
     const SurfaceInteraction& surface = batch.surfaces[s];
-    const bool transparent = context.scene.materials[surface.material].transparent;
-    const Rgb alpha = transparent ? opacity(batch.bsdfs[s]) : Rgb(1.0f);
+    const Rgb alpha = surface_alpha(context.scene.materials[surface.material], batch.bsdfs[s]);
     bool& done = batch.counters[path].passes_done;
-    if (!done && passes.wants_any(kSingleSurface) && average(alpha) >= kOpaque) {
+    if (!done && passes.wants_any(kSingleSurface) && is_shown(alpha)) {
         write_single_surface(context, surface, path, batch);
         done = true;
     }

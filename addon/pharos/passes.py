@@ -1,0 +1,99 @@
+"""The passes of a picture: names here, in Blender and in files, and which a view layer asks for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from . import compat
+
+
+class Pass(NamedTuple):
+    """One pass; `switch` is an attribute of the view layer, or of its `pharos` settings."""
+
+    film_pass: str  # enumerator of native.FilmPass
+    name: str  # in files, and in Blender unless it calls the pass otherwise
+    channels: str
+    kind: str  # VALUE, VECTOR or COLOR
+    switch: str = ""
+    short_name: str = ""  # in Blender before 5.0
+
+    @property
+    def blender_name(self) -> str:
+        """The name in Blender's render result."""
+        return self.short_name if self.short_name and compat.SHORT_PASS_NAMES else self.name
+
+    @property
+    def built_in(self) -> bool:
+        """Whether Blender makes room for it by itself."""
+        return not self.switch.startswith("pharos.")
+
+
+PASSES = (
+    Pass("Combined", "Combined", "RGBA", "COLOR"),
+    Pass("Depth", "Depth", "Z", "VALUE", "use_pass_z"),
+    Pass("Mist", "Mist", "Z", "VALUE", "use_pass_mist"),
+    Pass("Position", "Position", "XYZ", "VECTOR", "use_pass_position"),
+    Pass("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal"),
+    Pass("Uv", "UV", "UVA", "VECTOR", "use_pass_uv"),
+    Pass("ObjectIndex", "Object Index", "X", "VALUE", "use_pass_object_index", "IndexOB"),
+    Pass("MaterialIndex", "Material Index", "X", "VALUE", "use_pass_material_index", "IndexMA"),
+    Pass("Emission", "Emission", "RGB", "COLOR", "use_pass_emit", "Emit"),
+    Pass("Environment", "Environment", "RGB", "COLOR", "use_pass_environment", "Env"),
+    Pass("DenoisingNormal", "Denoising Normal", "XYZ", "VECTOR", "pharos.use_pass_denoising"),
+    Pass("DenoisingAlbedo", "Denoising Albedo", "RGB", "COLOR", "pharos.use_pass_denoising"),
+    Pass("SampleCount", "Debug Sample Count", "X", "VALUE", "pharos.use_pass_sample_count"),
+    Pass("GuideDirection", "Guide Direction", "XYZ", "VECTOR", "pharos.use_pass_guide_direction"),
+    Pass("GuideKappa", "Guide Kappa", "X", "VALUE", "pharos.use_pass_guide_kappa"),
+    Pass("GuideIrradiance", "Guide Irradiance", "X", "VALUE", "pharos.use_pass_guide_irradiance"),
+    Pass("GuideShare", "Guide Share", "X", "VALUE", "pharos.use_pass_guide_share"),
+)
+
+# Switches of Cycles that ask for the same.
+_CYCLES_SWITCHES = {
+    "pharos.use_pass_denoising": "denoising_store_passes",
+    "pharos.use_pass_sample_count": "pass_debug_sample_count",
+}
+_MIST_EXPONENTS = {"LINEAR": 1.0, "QUADRATIC": 2.0, "INVERSE_QUADRATIC": 0.5}
+
+
+def _is_wanted(view_layer, switch: str) -> bool:
+    if switch.startswith("pharos."):
+        cycles = getattr(view_layer, "cycles", None)
+        asked = getattr(cycles, _CYCLES_SWITCHES.get(switch, ""), False)
+        return asked or getattr(view_layer.pharos, switch.removeprefix("pharos."))
+    return bool(switch) and getattr(view_layer, switch)
+
+
+def wanted_passes(view_layer) -> list[Pass]:
+    """Passes beside Combined that a view layer asks for."""
+    return [entry for entry in PASSES if _is_wanted(view_layer, entry.switch)]
+
+
+class PassRequest:
+    """What the export has to know of the passes of a render; by default: none is wanted."""
+
+    def __init__(self, wanted: list[Pass] = ()):
+        self._names = {entry.film_pass for entry in wanted}
+        self.object_indices: list[int] = []
+        self.material_indices: list[int] = []
+
+    @property
+    def needs_uv(self) -> bool:
+        return "Uv" in self._names
+
+    def fields(self, native, world) -> dict:
+        """Arguments of set_passes, once the scene is exported."""
+        bits = sum(native.pass_bit(getattr(native.FilmPass, name)) for name in self._names)
+        fields = {"wanted": bits}
+        if "ObjectIndex" in self._names:
+            fields["object_indices"] = self.object_indices
+        if "MaterialIndex" in self._names:
+            fields["material_indices"] = self.material_indices
+        if "Mist" in self._names and world is not None:
+            mist = world.mist_settings
+            fields |= {
+                "mist_start": mist.start,
+                "mist_depth": mist.depth,
+                "mist_falloff": _MIST_EXPONENTS[mist.falloff],
+            }
+        return fields
