@@ -95,6 +95,11 @@ def uv_coordinates(layer, corner_count: int) -> np.ndarray:
     return _read(layer.data, "uv", corner_count, 2)
 
 
+def always_uses_nodes(owner) -> bool:
+    """Materials and worlds have no look without nodes since 5.0."""
+    return VERSION >= (5, 0, 0) and not isinstance(owner, bpy.types.Light)
+
+
 def light_strength(light) -> np.ndarray:
     """Colour x watts (a sun's: W/m2), with what newer versions add."""
     strength = np.array(light.color, np.float64) * light.energy
@@ -116,3 +121,10 @@ def material_samples_emission(material) -> bool:
     if hasattr(cycles, "emission_sampling"):
         return cycles.emission_sampling != "NONE"
     return getattr(cycles, "sample_as_light", True)
+
+
+def displacement_method(material) -> str:
+    """'BUMP', 'DISPLACEMENT' or 'BOTH'."""
+    if hasattr(material, "displacement_method"):
+        return material.displacement_method
+    return getattr(getattr(material, "cycles", None), "displacement_method", "BUMP")

@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import native
+from . import compat, native
 
 _ENGINE = "PHAROS"
 
@@ -295,8 +295,9 @@ class _TreePanel(_PharosPanel):
 
     def draw(self, context):
         layout, owner = self.layout, getattr(context, self.owner_name)
-        layout.prop(owner, "use_nodes", icon="NODETREE")
-        layout.separator()
+        if not compat.always_uses_nodes(owner):
+            layout.prop(owner, "use_nodes", icon="NODETREE")
+            layout.separator()
         name, options = self.plain
         if owner.use_nodes:
             draw_node_socket(layout, owner, self.output_type, "Surface")

@@ -7,14 +7,19 @@
 
 #include "bindings/bindings.h"
 #include "materials/node_program.h"
+#include "materials/procedural_hash.h"
 
 namespace py = pybind11;
 
 namespace pharos {
 namespace {
 
-// One operation as Python writes it: (code, mode, output, [operands]).
-using OpTuple = std::tuple<std::uint16_t, std::uint16_t, std::int32_t, std::vector<std::int32_t>>;
+// One operation as Python writes it: (code, mode, output, [operands], (step, step)).
+using OpTuple = std::tuple<std::uint16_t,
+                           std::uint16_t,
+                           std::int32_t,
+                           std::vector<std::int32_t>,
+                           std::pair<float, float>>;
 
 NodeProgram make_program(const std::vector<OpTuple>& ops,
                          std::vector<float> constants,
@@ -22,11 +27,12 @@ NodeProgram make_program(const std::vector<OpTuple>& ops,
     NodeProgram program;
     program.constants = std::move(constants);
     program.register_count = register_count;
-    for (const auto& [code, mode, output, operands] : ops) {
+    for (const auto& [code, mode, output, operands, step] : ops) {
         NodeOp op;
         op.code = static_cast<NodeOpCode>(code);
         op.mode = mode;
         op.output = output;
+        op.step = Vec2(step.first, step.second);
         op.first_operand = static_cast<std::uint32_t>(program.operands.size());
         op.operand_count = static_cast<std::uint32_t>(operands.size());
         program.operands.insert(program.operands.end(), operands.begin(), operands.end());
@@ -42,14 +48,27 @@ py::list list_ops(const NodeProgram& program) {
         out.append(py::make_tuple(static_cast<int>(op.code),
                                   op.mode,
                                   op.output,
-                                  std::vector<std::int32_t>(first, first + op.operand_count)));
+                                  std::vector<std::int32_t>(first, first + op.operand_count),
+                                  std::make_pair(op.step.x, op.step.y)));
     }
     return out;
+}
+
+// The number in [0, 1] that shader nodes know an object by: a polynomial of its name's bytes,
+// mixed.
+double random_of_name(const std::string& name) {
+    std::uint32_t hash = 0;
+    for (const char c : name) {
+        hash = hash * 37u + static_cast<std::uint32_t>(static_cast<std::int32_t>(c));
+    }
+    return static_cast<double>(detail::hash_words<2>({hash, 0u})) / 4294967295.0;
 }
 
 }  // namespace
 
 void bind_programs(py::module_& m) {
+    m.def("random_of_name", &random_of_name, FloatGuard(), py::arg("name"));
+
     py::class_<ImageUse>(m, "ImageUse", py::module_local())
         .def(py::init([](const py::kwargs& fields) {
                  ImageUse use;

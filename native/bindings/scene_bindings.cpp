@@ -58,6 +58,9 @@ std::uint32_t index_of_last(std::size_t size) {
 
 using NamedUv = std::pair<std::string, Array<float>>;
 
+// (name, domain, rows of 1 to 4 numbers)
+using NamedValues = std::tuple<std::string, NormalDomain, Array<float>>;
+
 struct MeshArrays {
     Array<float> positions;
     Array<std::uint32_t> triangles;
@@ -65,6 +68,7 @@ struct MeshArrays {
     std::optional<Array<float>> normals;
     std::optional<Array<std::uint16_t>> material_indices;
     std::vector<NamedUv> uv_maps;
+    std::vector<NamedValues> attributes;
 };
 
 std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArrays& arrays) {
@@ -81,6 +85,13 @@ std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArra
     }
     for (const auto& [uv_name, uv] : arrays.uv_maps) {
         mesh.uv_maps.push_back({uv_name, copy_rows<Vec2>(uv, name, "uv are not pairs")});
+    }
+    for (const auto& [attribute, domain, values] : arrays.attributes) {
+        require(values.ndim() == 2, name, "an attribute is no table");
+        mesh.attributes.push_back({attribute,
+                                   domain,
+                                   static_cast<std::uint32_t>(values.shape(1)),
+                                   copy_rows<float>(values, name, "attribute")});
     }
     const std::size_t normals = mesh.normal_domain == NormalDomain::Face ? 0
                                 : mesh.normal_domain == NormalDomain::Vertex
@@ -169,6 +180,12 @@ py::dict mesh_as_dict(const SceneDescription& scene, std::size_t index) {
     out["normals"] = to_array<float>(mesh.normals);
     out["material_indices"] = to_array<std::uint16_t>(mesh.material_indices);
     out["uv_maps"] = uv_maps;
+    py::dict attributes;
+    for (const MeshAttribute& attribute : mesh.attributes) {
+        attributes[py::str(attribute.name)] =
+            py::make_tuple(attribute.domain, to_array<float>(attribute.values));
+    }
+    out["attributes"] = attributes;
     return out;
 }
 
@@ -277,7 +294,8 @@ void bind_adders(py::class_<SceneDescription>& scene) {
                NormalDomain domain,
                std::optional<Array<float>> normals,
                std::optional<Array<std::uint16_t>> materials,
-               std::vector<NamedUv> uv_maps) {
+               std::vector<NamedUv> uv_maps,
+               std::vector<NamedValues> attributes) {
                 return add_mesh(s,
                                 std::move(name),
                                 {std::move(positions),
@@ -285,7 +303,8 @@ void bind_adders(py::class_<SceneDescription>& scene) {
                                  domain,
                                  std::move(normals),
                                  std::move(materials),
-                                 std::move(uv_maps)});
+                                 std::move(uv_maps),
+                                 std::move(attributes)});
             },
             FloatGuard(),
             py::arg("name"),
@@ -294,7 +313,17 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("normal_domain") = NormalDomain::Face,
             py::arg("normals") = py::none(),
             py::arg("material_indices") = py::none(),
-            py::arg("uv_maps") = std::vector<NamedUv>())
+            py::arg("uv_maps") = std::vector<NamedUv>(),
+            py::arg("attributes") = std::vector<NamedValues>())
+        .def(
+            "add_instance_attribute",
+            [](SceneDescription& s, std::string name, const Array<float>& values) {
+                auto rows = copy_rows<Vec4>(values, name, "values are not rows of four");
+                s.instance_attributes.push_back({std::move(name), std::move(rows)});
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("values"))
         .def(
             "add_material",
             [](SceneDescription& s, std::string name, NodeProgram program, bool emission_sampling) {

@@ -19,6 +19,20 @@ struct UvMap {
     std::vector<Vec2> uv;  // per corner: 3 x triangles
 };
 
+// Values that only node programs read, under their name.
+struct MeshAttribute {
+    std::string name;
+    NormalDomain domain = NormalDomain::Vertex;
+    std::uint32_t components = 3;  // 1: a number, 2 and 3: a vector, 4: a colour with alpha
+    std::vector<float> values;     // components x faces, vertices or corners (3 x triangles)
+};
+
+// A value of each instance, under its name.
+struct InstanceAttribute {
+    std::string name;
+    std::vector<Vec4> values;  // colour or vector, alpha
+};
+
 struct Mesh {
     std::string name;
     std::vector<Vec3> positions;
@@ -27,6 +41,7 @@ struct Mesh {
     std::vector<Vec3> normals;  // Face: empty; Vertex: positions.size(); Corner: 3 x triangles
     std::vector<std::uint16_t> material_indices;  // slot of each triangle; empty: all 0
     std::vector<UvMap> uv_maps;                   // first = the one rendered by default
+    std::vector<MeshAttribute> attributes;
 };
 
 }  // namespace pharos

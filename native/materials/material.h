@@ -72,6 +72,9 @@ struct ShadingContext {
     Mat4 camera_to_window{1.0f};           // projective: the frame is [0, 1] x [0, 1]
     std::span<const PathInfo> paths;       // of the hits or directions; empty: camera rays
     std::span<const Bounds3> mesh_bounds;  // object space, by mesh; empty: found when first needed
+    std::span<const InstanceAttribute> instance_attributes;  // values by instance
+    Vec2 pixel{0.0f};  // its size: at distance 1 of a perspective camera, else as it is
+    bool perspective = true;
 };
 
 // Working memory of one thread, reused from call to call so that shading does not allocate.
@@ -80,6 +83,7 @@ struct ShadingScratch {
     std::vector<float> coordinates;           // of image look-ups
     std::vector<float> texels;                // of box projections
     std::vector<SurfaceInteraction> hits;     // stand-ins of world directions
+    std::vector<SurfaceInteraction> shifted;  // a little beside the hits: bump mapping
     std::vector<Bounds3> mesh_bounds;         // by mesh, where the context has none
     std::vector<const Vec3*> bounded_meshes;  // positions that mesh_bounds belong to
 };

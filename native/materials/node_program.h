@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "core/math.h"
 #include "image/image_sampling.h"
 
 namespace pharos {
@@ -87,6 +88,12 @@ enum class NodeOpCode : std::uint16_t {
     Brick = 43,    // vector:3 color1:3 color2:3 mortar:3 scale:1 mortar_size:1 mortar_smooth:1
                    // bias:1 width:1 height:1 offset:1 squash:1 offset_frequency:1
                    // squash_frequency:1 -> 4 (color, factor)
+    Bump = 44,     // strength:1 distance:1 filter_width:1 height:1 height_x:1 height_y:1
+                   // normal:3 (default: the surface's); the heights here and filter_width steps
+                   // beside (NodeOp::step); mode = kInvertBit or 0 -> 3
+    Attribute = 45,          // mode = name index of a mesh's attribute or uv map
+                             // -> 5 (color or vector, alpha, mean); 0 where there is none
+    InstanceAttribute = 46,  // mode = name index of an attribute of instances -> 5 likewise
     // --- closures; weight:3 is always the first operand ---
     Diffuse = 100,       // weight:3 color:3 roughness:1 normal:3
     Glossy = 101,        // weight:3 color:3 roughness:1 normal:3; mode = Distribution
@@ -282,6 +289,9 @@ struct NodeOp {
     std::int32_t output = -1;  // first register written
     std::uint32_t first_operand = 0;
     std::uint32_t operand_count = 0;
+    // Operations that say where the hit is may look this many pixels' footprints beside it, along
+    // two axes in the surface: bump mapping compares heights.
+    Vec2 step{0.0f};
 };
 
 enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectangular, MirrorBall };

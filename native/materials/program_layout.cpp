@@ -55,6 +55,9 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Wave, OpKind::Pure, "3111111", 1},
     {NodeOpCode::Magic, OpKind::Pure, "311", 4},
     {NodeOpCode::Brick, OpKind::Pure, "33331111111111", 4},
+    {NodeOpCode::Bump, OpKind::Hit, "1111113*", 3},
+    {NodeOpCode::Attribute, OpKind::Hit, "", 5},
+    {NodeOpCode::InstanceAttribute, OpKind::Hit, "", 5},
     {NodeOpCode::Diffuse, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glossy, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glass, OpKind::Closure, "33113*", 0},
@@ -84,6 +87,9 @@ constexpr OpLayout kLayouts[] = {
             return op.mode == 1 || op.mode == 3;
         case NodeOpCode::Uv:
             return op.mode == kDefaultName || op.mode < program.names.size();
+        case NodeOpCode::Attribute:
+        case NodeOpCode::InstanceAttribute:
+            return op.mode < program.names.size();
         case NodeOpCode::Geometry:
             return op.mode <= static_cast<std::uint16_t>(GeometryOutput::Tangent);
         case NodeOpCode::Coordinate:

@@ -59,13 +59,30 @@ constexpr RunFunction kRun[] = {
     run_wave,
     run_magic,
     run_brick,
+    run_bump,
+    run_attribute,
+    run_instance_attribute,
 };
 
 }  // namespace
 
 void run_values(const Evaluation& e, std::span<const NodeOp> ops) {
+    Vec2 shifted(0.0f);
     for (const NodeOp& op : ops) {
-        kRun[static_cast<std::size_t>(op.code)](e, op);
+        if (op.step.x == 0.0f && op.step.y == 0.0f) {
+            kRun[static_cast<std::size_t>(op.code)](e, op);
+            continue;
+        }
+        // Bump mapping: the same operation a little beside every hit.
+        if (op.step != shifted) {
+            shift_hits(e, op.step);
+            shifted = op.step;
+        }
+        Evaluation beside = e;
+        beside.hits = std::span<const SurfaceInteraction>(e.scratch.shifted).first(e.lanes);
+        beside.paths = {};
+        beside.index = {};
+        kRun[static_cast<std::size_t>(op.code)](beside, op);
     }
 }
 

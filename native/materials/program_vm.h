@@ -142,6 +142,9 @@ void run_voronoi(const Evaluation& e, const NodeOp& op);
 void run_wave(const Evaluation& e, const NodeOp& op);
 void run_magic(const Evaluation& e, const NodeOp& op);
 void run_brick(const Evaluation& e, const NodeOp& op);
+void run_bump(const Evaluation& e, const NodeOp& op);
+void run_attribute(const Evaluation& e, const NodeOp& op);
+void run_instance_attribute(const Evaluation& e, const NodeOp& op);
 
 // Appends the scattering closures of every hit (index of out) and adds its emission.
 void run_closures(const Evaluation& e, std::span<const NodeOp> ops, ClosureBatch& out);
@@ -149,6 +152,9 @@ void run_closures(const Evaluation& e, std::span<const NodeOp> ops, ClosureBatch
 // Emitted radiance, or transmittance, of each lane; values[lane] is set.
 void run_emission(const Evaluation& e, std::span<const NodeOp> ops, std::span<Rgb> values);
 void run_transparency(const Evaluation& e, std::span<const NodeOp> ops, std::span<Rgb> values);
+
+// Fills scratch.shifted with every lane's hit moved by `step` footprints of a pixel.
+void shift_hits(const Evaluation& e, const Vec2& step);
 
 // Geometry shared by operations.
 [[nodiscard]] Vec3 object_normal(const Evaluation& e, const SurfaceInteraction& hit);

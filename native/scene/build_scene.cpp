@@ -95,6 +95,12 @@ void SceneBuild::mend() {
                 const auto& indices = d.passes.object_indices;
                 scene_->pass_index.push_back(i < indices.size() ? indices[i] : 0);
             }
+            // Values of attributes move up with their instances.
+            const std::size_t place = scene_->instances.size() - 1;
+            for (InstanceAttribute& attribute : d.instance_attributes) {
+                attribute.values.resize(d.instances.size(), Vec4(0.0f));
+                attribute.values[place] = attribute.values[i];
+            }
         }
     }
     scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances);
@@ -165,11 +171,17 @@ void SceneBuild::make_shading_context() {
     context.instances = scene_->instances;
     context.textures = scene_->textures;
     context.mesh_bounds = scene_->mesh_bounds;
+    context.instance_attributes = d.instance_attributes;
     context.blender_version = d.blender_version;
     if (!d.has_camera) {
         return;
     }
     context.world_to_camera = Camera(d.camera, d.film.width, d.film.height).world_to_camera();
+    context.perspective = d.camera.type == CameraType::Perspective;
+    context.pixel =
+        (d.camera.window_upper - d.camera.window_lower) /
+        glm::max(Vec2(static_cast<float>(d.film.width), static_cast<float>(d.film.height)),
+                 Vec2(1.0f));
     // The window (distance 1 of a perspective camera) onto [0, 1] x [0, 1].
     const Vec2 lower = d.camera.window_lower;
     const Vec2 scale = 1.0f / (d.camera.window_upper - lower);

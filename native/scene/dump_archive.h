@@ -30,7 +30,7 @@ inline constexpr bool kPlain =
     std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> || std::is_same_v<T, UVec3> ||
     std::is_same_v<T, Mat4>;
 
-inline constexpr std::uint32_t kVersion = 2;  // 2: passes on request
+inline constexpr std::uint32_t kVersion = 3;  // 2: passes on request; 3: attributes
 inline constexpr std::uint32_t kOldestVersion = 1;
 
 class Writer {
@@ -38,7 +38,10 @@ class Writer {
     template <class T>
     using Value = const T;
 
-    [[nodiscard]] static std::uint32_t version() { return kVersion; }
+    // Another version than the newest: for tests of reading old files.
+    explicit Writer(std::uint32_t version = kVersion) : version_(version) {}
+
+    [[nodiscard]] std::uint32_t version() const { return version_; }
 
     template <class... T>
     void operator()(const T&... values) {
@@ -89,6 +92,7 @@ class Writer {
     }
 
     std::vector<std::uint8_t> bytes_;
+    std::uint32_t version_;
 };
 
 class Reader {

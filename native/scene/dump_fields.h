@@ -68,15 +68,40 @@ void fields(Archive& archive, DumpValue<Archive, UvMap>& value) {
 }
 
 template <class Archive>
+void fields(Archive& archive, DumpValue<Archive, MeshAttribute>& value) {
+    auto& [name, domain, components, values] = value;
+    archive(name, domain, components, values);
+}
+
+template <class Archive>
+void fields(Archive& archive, DumpValue<Archive, InstanceAttribute>& value) {
+    auto& [name, values] = value;
+    archive(name, values);
+}
+
+template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, Mesh>& value) {
-    auto& [name, positions, triangles, normal_domain, normals, material_indices, uv_maps] = value;
+    auto& [name,
+           positions,
+           triangles,
+           normal_domain,
+           normals,
+           material_indices,
+           uv_maps,
+           attributes] = value;
     archive(name, positions, triangles, normal_domain, normals, material_indices, uv_maps);
+    if (archive.version() >= 3) {
+        archive(attributes);
+    }
 }
 
 template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, NodeOp>& value) {
-    auto& [code, mode, output, first_operand, operand_count] = value;
+    auto& [code, mode, output, first_operand, operand_count, step] = value;
     archive(code, mode, output, first_operand, operand_count);
+    if (archive.version() >= 3) {
+        archive(step);
+    }
 }
 
 template <class Archive>
@@ -213,11 +238,15 @@ void fields(Archive& archive, DumpValue<Archive, SceneDescription>& value) {
            camera,
            film,
            settings,
-           passes] = value;
+           passes,
+           instance_attributes] = value;
     archive(blender_version, meshes, materials, material_sets, instances, images, lights, world);
     archive(has_camera, camera, film, settings);
     if (archive.version() >= 2) {
         archive(passes);
+    }
+    if (archive.version() >= 3) {
+        archive(instance_attributes);
     }
 }
 

@@ -81,6 +81,18 @@ void keep_corners(std::vector<T>& values, const std::vector<std::uint32_t>& kept
     values.resize(3 * kept.size());
 }
 
+// The same for any number of values a triangle.
+void keep_values(std::vector<float>& values,
+                 std::size_t each,
+                 const std::vector<std::uint32_t>& kept) {
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+        for (std::size_t k = 0; k < each; ++k) {
+            values[each * i + k] = values[each * kept[i] + k];
+        }
+    }
+    values.resize(each * kept.size());
+}
+
 // Drops all triangles but `kept` (ascending) from every array that follows them.
 void keep_triangles(Mesh& mesh, const std::vector<std::uint32_t>& kept) {
     for (std::size_t i = 0; i < kept.size(); ++i) {
@@ -98,6 +110,12 @@ void keep_triangles(Mesh& mesh, const std::vector<std::uint32_t>& kept) {
     }
     for (UvMap& map : mesh.uv_maps) {
         keep_corners(map.uv, kept);
+    }
+    for (MeshAttribute& attribute : mesh.attributes) {
+        if (attribute.domain != NormalDomain::Vertex) {
+            const bool corners = attribute.domain == NormalDomain::Corner;
+            keep_values(attribute.values, attribute.components * (corners ? 3u : 1u), kept);
+        }
     }
 }
 
@@ -127,6 +145,20 @@ void drop_misfits(Mesh& mesh, SceneReport& report) {
             map.uv.assign(corners, Vec2(0.0f));
         }
     }
+    std::erase_if(mesh.attributes, [&](const MeshAttribute& attribute) {
+        const std::size_t elements = attribute.domain == NormalDomain::Face ? mesh.triangles.size()
+                                     : attribute.domain == NormalDomain::Vertex
+                                         ? mesh.positions.size()
+                                         : corners;
+        const bool fits = attribute.components >= 1 && attribute.components <= 4 &&
+                          attribute.values.size() == elements * attribute.components;
+        if (!fits) {
+            report.add(Severity::Warning,
+                       mesh.name,
+                       "The attribute '" + attribute.name + "' does not fit the mesh; it is zero.");
+        }
+        return !fits;
+    });
 }
 
 // The inverse, unless the matrix flattens space (relative to its columns' lengths: a tiny object is

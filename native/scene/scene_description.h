@@ -84,6 +84,7 @@ struct SceneDescription {
     FilmDescription film;
     RenderSettings settings;
     PassesDescription passes;
+    std::vector<InstanceAttribute> instance_attributes;  // values by instance; zero beyond the end
 };
 
 }  // namespace pharos

@@ -92,10 +92,11 @@ def _material(case: Case):
     return owner
 
 
-def _settings() -> None:
+def settings(samples: int = 1) -> None:
+    """Cycles without anything that changes pictures beside the paths."""
     scene = bpy.context.scene
     cycles = scene.cycles
-    cycles.device, cycles.samples, cycles.pixel_filter_type = "CPU", 1, "BOX"
+    cycles.device, cycles.samples, cycles.pixel_filter_type = "CPU", samples, "BOX"
     cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = cycles.blur_glossy = 0.0
     cycles.film_exposure, cycles.seed = 1.0, 0
@@ -103,7 +104,7 @@ def _settings() -> None:
 
 def _pictures(cases) -> dict[str, np.ndarray]:
     harness.new_scene(SIDE, SIDE, samples=1)
-    _settings()
+    settings()
     values = np.zeros((SIDE, SIDE, 4), np.float32)
     for i, case in enumerate(cases):
         row, column = divmod(i, SIDE // TILE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .attributes import instance_value, read_attributes
 from .lights import light_fields
 from .meshes import add_mesh, evaluated_mesh, read_mesh
 from .visibility import Visibility
@@ -34,6 +35,7 @@ class InstanceExporter:
         self._visibility = Visibility(context.native, context.view_layer, context.report)
         self._meshes: dict[tuple, int | None] = {}
         self._names: list[str] = []
+        self._attributes: dict[str, dict[int, tuple]] = {}  # by name and row
         self._rows: list[tuple[int, int, int, int]] = []  # place in depsgraph, mesh, set, bits
 
     def run(self) -> None:
@@ -83,28 +85,35 @@ class InstanceExporter:
         if not bits:
             return
         self._visibility.name_unsupported(obj)
-        material_set, uses_uv = self._context.materials.set_of(obj)
+        materials = self._context.materials.set_of(obj)
         passes = self._context.passes
-        mesh = self._mesh_index(obj, uses_uv or passes.needs_uv)
+        with_uv = materials.uses_uv or passes.needs_uv
+        mesh = self._mesh_index(obj, with_uv, materials.mesh_attributes)
         if mesh is not None:
             self._names.append(obj.name)
             passes.object_indices.append(obj.pass_index)
-            self._rows.append((place, mesh, material_set, bits))
+            for name in materials.instance_attributes:
+                values = self._attributes.setdefault(name, {})
+                values[len(self._rows)] = instance_value(self._native, instance, name)
+            self._rows.append((place, mesh, materials.index, bits))
 
-    def _mesh_index(self, obj, uses_uv: bool) -> int | None:
+    def _mesh_index(self, obj, uses_uv: bool, attributes: frozenset) -> int | None:
         slots = len(obj.material_slots)
-        key = (obj.data.as_pointer(), uses_uv, slots)
+        key = (obj.data.as_pointer(), uses_uv, slots, attributes)
         if key not in self._meshes:
-            self._meshes[key] = self._read(obj, slots, uses_uv)
+            self._meshes[key] = self._read(obj, slots, uses_uv, attributes)
         return self._meshes[key]
 
-    def _read(self, obj, slots: int, uses_uv: bool) -> int | None:
+    def _read(self, obj, slots: int, uses_uv: bool, attributes: frozenset) -> int | None:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
             arrays = read_mesh(mesh, slots, uses_uv)
             if arrays is None:
                 return None
+            if attributes:
+                found = read_attributes(mesh, attributes, self._context.report)
+                arrays = arrays._replace(attributes=found)
             self._context.progress(obj.name)
             return add_mesh(self._native, self._context.description, obj.data.name, arrays)
 
@@ -119,3 +128,7 @@ class InstanceExporter:
             material_sets=rows[:, 2],
             visibility=rows[:, 3],
         )
+        for name, values in self._attributes.items():
+            table = np.zeros((len(self._rows), 4), np.float32)
+            table[list(values)] = list(values.values())
+            self._context.description.add_instance_attribute(name, table)

@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from .. import compat
-from .nodes import flatten_material
+from .nodes import Flattened, flatten_material
+
+
+class MaterialSet(NamedTuple):
+    """Its index, and what its materials read of meshes and instances."""
+
+    index: int
+    uses_uv: bool
+    mesh_attributes: frozenset
+    instance_attributes: frozenset
 
 
 class MaterialTable:
@@ -15,14 +26,14 @@ class MaterialTable:
         self._images = images
         self._report = report
         self._override = override
-        self._materials: dict[int, tuple[int, bool]] = {}
+        self._materials: dict[int, tuple[int, Flattened | None]] = {}
         self._sets: dict[tuple[int, ...], int] = {}
         self.pass_indices: list[int] = []  # of each material added
 
-    def _material(self, material) -> tuple[int, bool]:
-        """Index and whether UV maps are needed."""
+    def _material(self, material) -> tuple[int, Flattened | None]:
+        """Index and what it needs."""
         if material is None:
-            return self._native.NONE, False
+            return self._native.NONE, None
         key = material.original.as_pointer()
         if key not in self._materials:
             flat = flatten_material(self._native, self._images, self._report, material)
@@ -31,12 +42,12 @@ class MaterialTable:
                 program=flat.program,
                 emission_sampling=compat.material_samples_emission(material),
             )
-            self._materials[key] = index, flat.uses_uv
+            self._materials[key] = index, flat._replace(program=None)
             self.pass_indices.append(material.pass_index)
         return self._materials[key]
 
-    def set_of(self, obj) -> tuple[int, bool]:
-        """The material set of an object's slots, and whether its mesh needs UV maps."""
+    def set_of(self, obj) -> MaterialSet:
+        """The material set of an object's slots, and what they read."""
         slots = [slot.material for slot in obj.material_slots] or [None]
         if self._override is not None:
             slots = [self._override] * len(slots)
@@ -44,4 +55,10 @@ class MaterialTable:
         key = tuple(index for index, _ in found)
         if key not in self._sets:
             self._sets[key] = self._description.add_material_set(list(key))
-        return self._sets[key], any(uses_uv for _, uses_uv in found)
+        needs = [flat for _, flat in found if flat is not None]
+        return MaterialSet(
+            self._sets[key],
+            any(flat.uses_uv for flat in needs),
+            frozenset().union(*(flat.mesh_attributes for flat in needs)),
+            frozenset().union(*(flat.instance_attributes for flat in needs)),
+        )

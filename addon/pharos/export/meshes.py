@@ -21,6 +21,7 @@ class MeshArrays(NamedTuple):
     normals: np.ndarray | None
     material_indices: np.ndarray | None
     uv_maps: list
+    attributes: tuple = ()
 
 
 @contextmanager
@@ -113,4 +114,8 @@ def add_mesh(native, description, name: str, arrays: MeshArrays) -> int:
         normals=arrays.normals,
         material_indices=arrays.material_indices,
         uv_maps=arrays.uv_maps,
+        attributes=[
+            (name, getattr(native.NormalDomain, _DOMAINS[where]), values)
+            for name, where, values in arrays.attributes
+        ],
     )

@@ -4,6 +4,8 @@ node_values.
 
 from __future__ import annotations
 
+from .attributes import INSTANCER, OBJECT, OBJECT_INFO
+
 
 def camel(name: str) -> str:
     """MULTIPLY_ADD as the native side writes it: MultiplyAdd."""
@@ -34,6 +36,14 @@ def _uv_map(f, node, scope, socket):
     return uv(f, node.uv_map)
 
 
+def surface_normal(f):
+    """The normal that a surface has before its nodes change it: displacement may have."""
+    displaced = f.program.default_normal
+    if displaced.operand != f.native.DEFAULT_OPERAND:
+        return displaced
+    return f.program.op("Geometry", [], 3, f.native.GeometryOutput["Normal"])
+
+
 _GEOMETRY = {
     "Position": 3,
     "Normal": 3,
@@ -49,6 +59,8 @@ def _geometry(f, node, scope, socket):
     size = _GEOMETRY.get(socket.identifier)
     if size is None:
         return None
+    if socket.identifier == "Normal":
+        return surface_normal(f)
     mode = f.native.GeometryOutput[socket.identifier.replace(" ", "")]
     return f.program.op("Geometry", [], size, mode)
 
@@ -76,20 +88,46 @@ def _light_path(f, node, scope, socket):
 
 
 def _object_info(f, node, scope, socket):
-    modes = f.native.ObjectInfoOutput
-    if socket.identifier not in modes:
-        return None
-    size = 3 if socket.identifier == "Location" else 1
-    return f.program.op("ObjectInfo", [], size, modes[socket.identifier])
+    name = socket.identifier
+    if name == "Location":
+        return f.program.op("ObjectInfo", [], 3, f.native.ObjectInfoOutput["Location"])
+    if name == "Material Index":
+        return f.program.constant(f.material_index)
+    what = {"Object Index": "Index", "Alpha": "Color"}.get(name, name)
+    value = instance_attribute(f, OBJECT_INFO + what)
+    if name == "Alpha":
+        return f.program.component(value, 3)
+    return f.program.slice(value, 3 if name == "Color" else 1)
+
+
+def instance_attribute(f, name: str):
+    f.program.instance_attributes.add(name)
+    return f.program.op("InstanceAttribute", [], 5, f.program.name_index(name))
+
+
+def _mesh_attribute(f, name: str):
+    f.program.mesh_attributes.add(name)
+    return f.program.op("Attribute", [], 5, f.program.name_of(name))
+
+
+_ATTRIBUTE_PARTS = {"Color": (0, 3), "Vector": (0, 3), "Alpha": (3, 1), "Fac": (4, 1)}
 
 
 def _attribute(f, node, scope, socket):
-    """UV maps are the attributes that meshes bring along."""
-    f.unsupported(node, f"read as UV map {node.attribute_name!r}; other attributes")
-    if socket.identifier == "Alpha":
-        return f.program.constant(1.0)
-    value = uv(f, node.attribute_name)
-    return f.program.op("VectorAverage", [value], 1) if socket.identifier == "Fac" else value
+    kind = node.attribute_type
+    if kind == "GEOMETRY":
+        value = _mesh_attribute(f, node.attribute_name)
+    elif kind in {"OBJECT", "INSTANCER"}:
+        prefix = OBJECT if kind == "OBJECT" else INSTANCER
+        value = instance_attribute(f, prefix + node.attribute_name)
+    else:
+        return None
+    return f.program.part(value, *_ATTRIBUTE_PARTS[socket.identifier])
+
+
+def _color_attribute(f, node, scope, socket):
+    value = _mesh_attribute(f, node.layer_name)
+    return f.program.part(value, *_ATTRIBUTE_PARTS[socket.identifier])
 
 
 def vector_or(f, node, scope, default):
@@ -115,4 +153,5 @@ COORDINATES = {
     "ShaderNodeCameraData": _named_output("CameraData", "CameraDataOutput", {"ViewVector": 3}),
     "ShaderNodeLightPath": _light_path,
     "ShaderNodeAttribute": _attribute,
+    "ShaderNodeVertexColor": _color_attribute,
 }

@@ -26,7 +26,7 @@ def _extension(f, node):
 
 def _memoised_image(f, node, scope, make):
     """Colour and alpha of a node share one operation."""
-    key = (scope.path, node.name)
+    key = (scope.path, node.name, f.program.step)
     if key not in f.image_values:
         f.image_values[key] = make()
     return f.image_values[key]

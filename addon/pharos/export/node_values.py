@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .node_coordinates import COORDINATES, camel, uv
+from .node_coordinates import COORDINATES, camel, surface_normal, uv
 from .node_images import IMAGES
 from .node_textures import TEXTURES
+from .tree import input_by_identifier
 
 _TABLE_ROWS = 256
 
@@ -248,12 +249,44 @@ def _normal_map(f, node, scope, socket):
     return f.program.op("NormalMap", operands, 3, f.native.NormalMapSpace[camel(space)])
 
 
+def bumped_normal(f, operands, width: float, height, inverted: bool = False):
+    """The normal that heights make: `height()` gives them where the program looks; `operands` are
+    strength and distance, then the normal.
+    """
+    before, heights = f.program.step, []
+    for step in ((0.0, 0.0), (width, 0.0), (0.0, width)):
+        f.program.step = step
+        heights.append(height())
+    f.program.step = before
+    strength, distance, normal = operands
+    operands = [strength, distance, f.program.constant(width), *heights, normal]
+    return f.program.op("Bump", operands, 3, f.native.INVERT_BIT if inverted else 0)
+
+
 def _bump(f, node, scope, socket):
-    """Without bump mapping, the normal that it would have changed."""
-    f.unsupported(node)
-    if f.linked(node, scope, "Normal"):
-        return f.input(node, scope, "Normal", 3)
-    return f.program.op("Geometry", [], 3, f.native.GeometryOutput["Normal"])
+    normal = f.normal(node, scope)
+    if not f.linked(node, scope, "Height"):
+        if normal != f.program.default_normal:
+            return normal
+        return surface_normal(f)
+    operands = [f.input(node, scope, name, 1) for name in ("Strength", "Distance")]
+    # How far apart heights are compared, in pixels; a setting of newer versions.
+    width = input_by_identifier(node, "Filter Width")
+    width = 1.0 if width is None else max(width.default_value, 1e-3)
+    return bumped_normal(
+        f, [*operands, normal], width, lambda: f.input(node, scope, "Height", 1), node.invert
+    )
+
+
+def displaced_height(f, source):
+    """What a Displacement node raises the surface by; None for another node."""
+    node, _, scope = source
+    if node.bl_idname != "ShaderNodeDisplacement":
+        return None
+    height = f.input(node, scope, "Height", 1)
+    middle = f.input(node, scope, "Midlevel", 1)
+    above = f.program.math("Subtract", height, middle)
+    return f.program.math("Multiply", above, f.input(node, scope, "Scale", 1))
 
 
 def _occlusion(f, node, scope, socket):

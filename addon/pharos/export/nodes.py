@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from .. import compat
 from .node_closures import CLOSURES
-from .node_values import VALUES
+from .node_values import VALUES, bumped_normal, displaced_height
 from .program import ProgramBuilder, Value
 from .tree import Scope, Source, Unlinked, input_by_identifier, resolve
 
@@ -23,6 +23,8 @@ class Flattened(NamedTuple):
 
     program: object
     uses_uv: bool
+    mesh_attributes: frozenset = frozenset()
+    instance_attributes: frozenset = frozenset()
 
 
 class Flattener:
@@ -35,6 +37,8 @@ class Flattener:
         self.owner = owner
         self.is_world = is_world
         self.version = compat.version_number()
+        self.material_index = 0
+        self.moves_surface = False
         self.program = ProgramBuilder(native)
         self.image_values: dict[tuple, Value] = {}  # image nodes: colour and alpha at once
         self._values: dict[tuple, Value] = {}
@@ -89,7 +93,7 @@ class Flattener:
 
     def _output(self, source: Source) -> Value:
         node, socket, scope = source
-        key = (scope.path, node.name, socket.identifier)
+        key = (scope.path, node.name, socket.identifier, self.program.step)
         if key in self._values:
             return self._values[key]
         if key in self._under_way:
@@ -142,18 +146,43 @@ class Flattener:
         output = tree.get_output_node("CYCLES")
         if output is not None:
             scope = Scope(tree)
-            for other in ("Volume", "Displacement"):
-                if self.linked(output, scope, other):
-                    self.warn(f"{other} is not supported.")
+            if self.linked(output, scope, "Volume"):
+                self.warn("Volume is not supported.")
+            if self.linked(output, scope, "Displacement"):
+                self._displace(resolve(input_by_identifier(output, "Displacement"), scope))
             self.shader(output, scope, surface, self.program.constant(1.0))
         return self.result()
 
+    def _displace(self, source: Source) -> None:
+        """Displacement tilts the normal that all closures start from."""
+        if displaced_height(self, source) is None:
+            self.unsupported(source.node, "displacement by it")
+            return
+        if self.moves_surface:
+            self.warn("True displacement is not supported; it is shown as bump mapping.")
+        one = self.program.constant(1.0)
+        width = 1.0 if self.version < 400 else 0.1
+        self.program.default_normal = bumped_normal(
+            self,
+            [one, one, self.program.default_normal],
+            width,
+            lambda: displaced_height(self, source),
+        )
+
     def result(self) -> Flattened:
-        return Flattened(self.program.build(), self.program.uses_uv)
+        program = self.program
+        return Flattened(
+            program.build(),
+            program.uses_uv,
+            frozenset(program.mesh_attributes),
+            frozenset(program.instance_attributes),
+        )
 
 
 def flatten_material(native, images, report, material) -> Flattened:
     flattener = Flattener(native, images, report, material.name)
+    flattener.material_index = material.pass_index
+    flattener.moves_surface = compat.displacement_method(material) != "BUMP"
     if material.use_nodes and material.node_tree is not None:
         return flattener.flatten(material.node_tree)
     program = flattener.program

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+# Operations that say where a hit is.
+_PLACES = {"Uv", "Geometry", "Coordinate", "Attribute"}
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
@@ -32,6 +34,9 @@ class ProgramBuilder:
         self._names: list[str] = []
         self._tables: list[list[float]] = []
         self._memo: dict[tuple, Value] = {}
+        self.step = (0.0, 0.0)  # where operations look that say where a hit is (bump mapping)
+        self.mesh_attributes: set[str] = set()
+        self.instance_attributes: set[str] = set()
         self.default_normal = Value(native.DEFAULT_OPERAND, 3)
 
     @property
@@ -48,18 +53,18 @@ class ProgramBuilder:
     def op(self, code: str, operands, size: int, mode: int = 0) -> Value:
         """Append a value operation (once: equal ones share their registers)."""
         operands = [value.operand for value in operands]
-        key = (code, mode, *operands)
+        step = self.step if code in _PLACES else (0.0, 0.0)
+        key = (code, mode, step, *operands)
         if key not in self._memo:
             output = self._registers
             self._registers += size
-            self._ops.append((self._native.NodeOpCode[code], mode, output, operands))
+            self._ops.append((self._native.NodeOpCode[code], mode, output, operands, step))
             self._memo[key] = Value(output, size)
         return self._memo[key]
 
     def closure(self, code: str, operands, mode: int = 0) -> None:
-        self._ops.append(
-            (self._native.NodeOpCode[code], mode, -1, [value.operand for value in operands])
-        )
+        operands = [value.operand for value in operands]
+        self._ops.append((self._native.NodeOpCode[code], mode, -1, operands, (0.0, 0.0)))
 
     def component(self, value: Value, index: int) -> Value:
         """One component of a wider value."""
@@ -126,8 +131,10 @@ class ProgramBuilder:
         return self.math("Subtract", self.constant(1.0), value)
 
     def name_index(self, name: str) -> int:
-        if not name:
-            return self._native.DEFAULT_NAME
+        """Of a UV map; without a name the first one's."""
+        return self.name_of(name) if name else self._native.DEFAULT_NAME
+
+    def name_of(self, name: str) -> int:
         if name not in self._names:
             self._names.append(name)
         return self._names.index(name)

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "film/passes.h"
+#include "scene/dump_fields.h"
 #include "support/description_builders.h"
 
 namespace pharos::testing {
@@ -73,6 +74,10 @@ SceneDescription full_description() {
     b.settings().guiding = GuidingMode::Slides;
     b.settings().caustics_refractive = false;
     b.description().blender_version = 405;
+    b.description().meshes[0].attributes = {
+        {"tint", NormalDomain::Face, 4, {0.5f, nan, 1.0f, 2.0f}}};
+    b.description().instance_attributes = {{"object:wear", {Vec4(0.25f), Vec4(1, 2, 3, 4)}}};
+    b.description().materials[0].program.ops[0].step = Vec2(0.1f, 0.0f);
     b.description().passes = {pass_bit(FilmPass::Mist), 1.0f, 2.0f, 0.5f, {7, 8}, {9}};
     return b.build();
 }
@@ -106,28 +111,46 @@ TEST(Dump, RoundTripIsBitEqual) {
     EXPECT_EQ(back.film.crop_height, 48u);
     EXPECT_EQ(back.settings.guiding, GuidingMode::Slides);
     EXPECT_FALSE(back.settings.caustics_refractive);
+    EXPECT_EQ(back.meshes.at(0).attributes.at(0).components, 4u);
+    EXPECT_EQ(back.meshes.at(0).attributes.at(0).values.at(3), 2.0f);
+    EXPECT_EQ(back.instance_attributes.at(0).name, "object:wear");
+    EXPECT_EQ(back.instance_attributes.at(0).values.at(1).w, 4.0f);
+    EXPECT_EQ(back.materials.at(0).program.ops.at(0).step.x, 0.1f);
     EXPECT_EQ(back.passes.wanted, pass_bit(FilmPass::Mist));
     EXPECT_EQ(back.passes.mist_falloff, 0.5f);
     EXPECT_EQ(back.passes.object_indices, (std::vector<std::uint32_t>{7, 8}));
 }
 
-// Version 1 ends before the passes on request.
-TEST(Dump, FilesOfTheFirstVersionAreRead) {
-    SceneDescription description = full_description();
-    description.passes = {};
-    std::vector<std::uint8_t> bytes = dump_to_bytes(description);
-    constexpr std::size_t kHeader = 32;
-    constexpr std::size_t kPasses = 4 * sizeof(float) + 2 * sizeof(std::uint64_t);
-    bytes.resize(bytes.size() - kPasses);
-    const std::uint64_t size = bytes.size() - kHeader;
-    std::uint64_t checksum = 0xcbf29ce484222325u;
-    for (std::size_t i = kHeader; i < bytes.size(); ++i) {
-        checksum = (checksum ^ bytes[i]) * 0x100000001b3u;
+// Older versions lack what came later: passes on request, then attributes and steps.
+TEST(Dump, FilesOfOlderVersionsAreRead) {
+    for (std::uint32_t version = 1; version < dump::kVersion; ++version) {
+        constexpr std::size_t kHeader = 32;
+        SceneDescription description = full_description();
+        dump::Writer writer(version);
+        writer.bytes() = dump_to_bytes(description);
+        writer.bytes().resize(kHeader);
+        writer(description);
+        std::vector<std::uint8_t> bytes = std::move(writer.bytes());
+        const std::uint64_t size = bytes.size() - kHeader;
+        std::uint64_t checksum = 0xcbf29ce484222325u;
+        for (std::size_t i = kHeader; i < bytes.size(); ++i) {
+            checksum = (checksum ^ bytes[i]) * 0x100000001b3u;
+        }
+        bytes[8] = static_cast<std::uint8_t>(version);
+        std::memcpy(&bytes[16], &size, sizeof(size));
+        std::memcpy(&bytes[24], &checksum, sizeof(checksum));
+        description.passes = version < 2 ? PassesDescription() : description.passes;
+        description.instance_attributes.clear();
+        for (Mesh& mesh : description.meshes) {
+            mesh.attributes.clear();
+        }
+        for (MaterialDescription& material : description.materials) {
+            for (NodeOp& op : material.program.ops) {
+                op.step = Vec2(0.0f);
+            }
+        }
+        EXPECT_EQ(dump_to_bytes(dump_from_bytes(bytes)), dump_to_bytes(description)) << version;
     }
-    bytes[8] = 1;
-    std::memcpy(&bytes[16], &size, sizeof(size));
-    std::memcpy(&bytes[24], &checksum, sizeof(checksum));
-    EXPECT_EQ(dump_to_bytes(dump_from_bytes(bytes)), dump_to_bytes(description));
 }
 
 TEST(Dump, EmptyDescription) {
