@@ -46,7 +46,7 @@ def main(names: dict) -> None:
     """Run the script's tests and end the process (some hosts hang at exit)."""
     failed = 0
     enable_addon()
-    for name, function in names.items():
+    for name, function in list(names.items()):
         if not name.startswith("test_"):
             continue
         try:
@@ -99,9 +99,21 @@ def new_scene(width: int = 16, height: int = 16, samples: int = 4):
     own.samples, own.seed, own.time_limit, own.follow_cycles = samples, 0, 0.0, False
     own.pixel_filter, own.exposure, own.guiding = "BOX", 1.0, "OFF"
     scene.world = bpy.data.worlds.new("World")
-    scene.world.use_nodes = False
-    scene.world.color = (0.0, 0.0, 0.0)
+    set_world((0.0, 0.0, 0.0))
     return scene
+
+
+def set_world(color) -> None:
+    """A world of one colour; Blender 5.0 has none without nodes."""
+    world = bpy.context.scene.world
+    world.use_nodes = False
+    world.color = color
+    if world.use_nodes:
+        background = next(
+            n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground"
+        )
+        background.inputs["Color"].default_value = (*color, 1.0)
+        background.inputs["Strength"].default_value = 1.0
 
 
 def link(obj):
@@ -258,6 +270,8 @@ def render_layers(name: str = "layers") -> dict[str, np.ndarray]:
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
     settings.exr_codec = "NONE"
+    if hasattr(settings, "use_exr_interleave"):
+        settings.use_exr_interleave = True  # all layers in one part
     scene.render.filepath = str(path)
     try:
         bpy.ops.render.render(write_still=True)

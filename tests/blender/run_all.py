@@ -7,6 +7,10 @@ Hosts come from the environment:
   BLENDER_USER_SCRIPTS where addons/pharos lies ready (default: build/blender)
 A script's line `# hosts: ...` names where it runs: blender, bpy, window (blender under xvfb) or
 driver (this Python, starting blender itself). Arguments choose scripts by part of their name.
+
+Another bpy is tried by hand, 5.0 say (any folder will do for the environment):
+  /usr/bin/python3 -m venv /tmp/bpy5 && /tmp/bpy5/bin/pip install 'bpy>=5.0,<5.1' numpy
+  PHAROS_TEST_HOSTS=bpy PHAROS_BPY_PYTHON=/tmp/bpy5/bin/python /usr/bin/python3 run_all.py
 """
 
 from __future__ import annotations

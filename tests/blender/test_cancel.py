@@ -8,7 +8,7 @@ import harness
 
 def _heavy(samples: int = 1 << 20):
     """Many instances of a subdivided mesh, a mirror and a world: every phase takes a while."""
-    scene = harness.new_scene(480, 270, samples)
+    harness.new_scene(480, 270, samples)
     harness.add_camera(location=(0, -6, 1), rotation=(1.4, 0.0, 0.0))
     mesh = harness.cube_mesh()
     shader = harness.material("Shiny")
@@ -16,7 +16,7 @@ def _heavy(samples: int = 1 << 20):
     harness.connect(shader, principled.outputs[0], harness.surface(shader))
     obj = harness.add_object(mesh, shader)
     obj.modifiers.new("Subdivision", "SUBSURF").render_levels = 7
-    scene.world.color = (0.5, 0.6, 0.7)
+    harness.set_world((0.5, 0.6, 0.7))
     return harness.exported()
 
 

@@ -100,9 +100,9 @@ def test_portals_emit_nothing():
 
 
 def test_world_colour():
-    scene = harness.new_scene()
+    harness.new_scene()
     harness.add_camera()
-    scene.world.color = (0.1, 0.2, 0.3)
+    harness.set_world((0.1, 0.2, 0.3))
     program = harness.exported().world.program
     assert harness.ops_of(program) == ["Background"]
     assert harness.operand(program, 0, 1, 3) == [0.1, 0.2, 0.3]

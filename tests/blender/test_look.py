@@ -28,7 +28,7 @@ def _follow(bounces: int, samples: int = 256) -> None:
 
 def _yard(lights) -> None:
     """A block on a floor, lit as asked; 'WORLD' stands for a blue sky."""
-    scene = harness.new_scene(16, 16)
+    harness.new_scene(16, 16)
     harness.add_camera(location=(0, -2, 1.5), rotation=(1.0, 0, 0))
     owner = harness.material()
     diffuse = harness.node(owner, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
@@ -38,7 +38,7 @@ def _yard(lights) -> None:
     block.scale, block.rotation_euler = (0.3, 0.3, 0.5), (0.0, 0.0, 0.3)
     for kind in lights:
         if kind == "WORLD":
-            scene.world.color = (0.35, 0.55, 1.0)
+            harness.set_world((0.35, 0.55, 1.0))
             continue
         light = bpy.data.lights.new(kind, kind)
         light.energy = _ENERGY[kind]

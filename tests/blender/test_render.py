@@ -50,7 +50,7 @@ def test_exposure():
 def test_transparent_film():
     scene = harness.new_scene(8, 8)
     harness.add_camera()
-    scene.world.color = (1.0, 1.0, 1.0)
+    harness.set_world((1.0, 1.0, 1.0))
     scene.render.film_transparent = True
     assert harness.close(harness.render(), 0.0)
     scene.render.film_transparent = False
@@ -75,7 +75,7 @@ def test_border():
     scene = harness.new_scene(32, 16, 4)
     harness.add_camera(rotation=(0.2, 0.1, 0.0))
     harness.add_object(harness.cube_mesh(), harness.emission())
-    scene.world.color = (0.2, 0.3, 0.4)
+    harness.set_world((0.2, 0.3, 0.4))
     whole = harness.render("whole")
     render = scene.render
     render.use_border, render.use_crop_to_border = True, True
@@ -107,6 +107,8 @@ def _multilayer(name: str) -> dict:
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    if hasattr(settings, "use_exr_interleave"):
+        settings.use_exr_interleave = True  # all layers in one part
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     return path
@@ -183,13 +185,13 @@ def test_animation():
 
 
 def test_same_picture_from_the_dump():
-    scene = harness.new_scene(24, 16, 8)
+    harness.new_scene(24, 16, 8)
     harness.add_camera(location=(0, -6, 1), rotation=(1.4, 0.0, 0.0))
     shader = harness.material("Mirrors")
     principled = harness.node(shader, "ShaderNodeBsdfPrincipled", Roughness=0.3, Metallic=0.5)
     harness.connect(shader, principled.outputs[0], harness.surface(shader))
     harness.add_object(harness.cube_mesh(), shader)
-    scene.world.color = (0.5, 0.6, 0.7)
+    harness.set_world((0.5, 0.6, 0.7))
     shown = harness.render()
     module = harness.native()
     session = module.RenderSession(harness.exported(), 1)

@@ -70,7 +70,7 @@ def step_prepare():
     scene = harness.new_scene(64, 64, 16)
     scene.pharos.preview_samples = 8
     scene.view_settings.view_transform = "Standard"
-    scene.world.color = (0.2, 0.5, 0.1)
+    harness.set_world((0.2, 0.5, 0.1))
     space = area().spaces[0]
     space.overlay.show_overlays = space.show_gizmo = False
     space.show_region_toolbar = space.show_region_ui = space.show_region_header = False
