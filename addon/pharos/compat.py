@@ -121,3 +121,10 @@ def material_samples_emission(material) -> bool:
     if hasattr(cycles, "emission_sampling"):
         return cycles.emission_sampling != "NONE"
     return getattr(cycles, "sample_as_light", True)
+
+
+def displacement_method(material) -> str:
+    """'BUMP', 'DISPLACEMENT' or 'BOTH'."""
+    if hasattr(material, "displacement_method"):
+        return material.displacement_method
+    return getattr(getattr(material, "cycles", None), "displacement_method", "BUMP")
