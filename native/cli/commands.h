@@ -14,5 +14,6 @@ class UsageError : public std::runtime_error {
 };
 
 int render(const std::vector<std::string>& arguments);
+int field(const std::vector<std::string>& arguments);
 
 }  // namespace pharos::cli

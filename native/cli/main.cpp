@@ -22,6 +22,15 @@ constexpr const char* kUsage =
     "  --snapshots A,B    also write OUT.A.exr, OUT.B.exr after that many samples\n"
     "  --stats            print work and time per stage\n"
     "  --stats-json FILE  write the same, with the snapshots' CPU seconds, as JSON\n"
+    "       pharos-cli field FILE --pixel X,Y -o OUT.exr [options]\n"
+    "  what the guide believes at a pixel's first hit (left) beside the light that is there "
+    "(right),\n"
+    "  as latitude-longitude pictures, also OUT.png; (0, 0) is the pixel bottom left\n"
+    "  --samples, --seed, --threads, --guiding, --nee as above; --guiding off counts as neural\n"
+    "  --load FILE        start from saved weights; without --samples they do not learn on\n"
+    "  --save FILE        write the weights\n"
+    "  --height N         rows of each picture (default: 64)\n"
+    "  --rays N           paths into each direction (default: 64)\n"
     "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write "
     "OUT)\n";
 
@@ -40,6 +49,9 @@ int main(int argc, char** argv) {
     try {
         if (arguments[0] == "render") {
             return pharos::cli::render({arguments.begin() + 1, arguments.end()});
+        }
+        if (arguments[0] == "field") {
+            return pharos::cli::field({arguments.begin() + 1, arguments.end()});
         }
         std::fprintf(stderr, "pharos-cli: unknown command '%s'\n%s", arguments[0].c_str(), kUsage);
         return 2;

@@ -1,6 +1,4 @@
 // pharos-cli render: a dump file to an EXR, with the statistics benchmarks read.
-#include <cctype>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -8,6 +6,7 @@
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/options.h"
 #include "image/image_io.h"
 #include "scene/dump.h"
 #include "session/render_session.h"
@@ -37,69 +36,6 @@ struct Options {
     std::string stats_json;
 };
 
-template <class T>
-T parse_number(const std::string& name, const std::string& text) {
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size()) {
-        throw UsageError(name + ": '" + text + "' is not a number");
-    }
-    return value;
-}
-
-GuidingMode parse_guiding(const std::string& text) {
-    std::string lower = text;
-    for (char& c : lower) {
-        c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-    if (lower == "off") {
-        return GuidingMode::Off;
-    }
-    if (lower == "neural") {
-        return GuidingMode::Neural;
-    }
-    if (lower == "slides") {
-        return GuidingMode::Slides;
-    }
-    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides");
-}
-
-std::vector<std::uint32_t> parse_list(const std::string& name, const std::string& text) {
-    std::vector<std::uint32_t> values;
-    for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        values.push_back(parse_number<std::uint32_t>(name, text.substr(begin, end - begin)));
-        begin = end + 1;
-    }
-    return values;
-}
-
-// "Position,Guide Kappa" or one of the words all, guide, none; the bits of the passes.
-std::uint32_t parse_passes(const std::string& text) {
-    if (text == "none") {
-        return 0;
-    }
-    if (text == "guide") {
-        return kGuidePasses;
-    }
-    std::uint32_t bits = 0;
-    for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        const std::string name = text.substr(begin, end - begin);
-        std::uint32_t found = 0;
-        for (std::size_t i = 0; i < kFilmPasses; ++i) {
-            const auto pass = static_cast<FilmPass>(i);
-            found |= text == "all" || name == film_pass_info(pass).name ? pass_bit(pass) : 0u;
-        }
-        if (found == 0) {
-            throw UsageError("--passes: there is no pass '" + name + "'");
-        }
-        bits |= found;
-        begin = end + 1;
-    }
-    return bits;
-}
-
 void parse_option(const std::string& name, const std::string& value, Options& options) {
     if (name == "-o" || name == "--output") {
         options.output = value;
@@ -114,10 +50,7 @@ void parse_option(const std::string& name, const std::string& value, Options& op
     } else if (name == "--guiding") {
         options.guiding = parse_guiding(value);
     } else if (name == "--nee") {
-        if (value != "on" && value != "off") {
-            throw UsageError("--nee: '" + value + "' is neither on nor off");
-        }
-        options.nee = value == "on";
+        options.nee = parse_switch(name, value);
     } else if (name == "--snapshots") {
         options.snapshots = parse_list(name, value);
     } else if (name == "--passes") {
@@ -131,21 +64,15 @@ void parse_option(const std::string& name, const std::string& value, Options& op
 
 Options parse(const std::vector<std::string>& arguments) {
     Options options;
-    for (std::size_t i = 0; i < arguments.size(); ++i) {
-        const std::string& argument = arguments[i];
-        if (argument == "--stats") {
-            options.stats = true;
-        } else if (argument.starts_with("-")) {
-            if (i + 1 == arguments.size()) {
-                throw UsageError(argument + " needs a value");
-            }
-            parse_option(argument, arguments[++i], options);
-        } else if (options.input.empty()) {
-            options.input = argument;
-        } else {
-            throw UsageError("one input file only, not also '" + argument + "'");
-        }
-    }
+    options.input = walk_arguments(
+        arguments,
+        [&](const std::string& word) {
+            options.stats |= word == "--stats";
+            return word == "--stats";
+        },
+        [&](const std::string& name, const std::string& value) {
+            parse_option(name, value, options);
+        });
     if (options.input.empty() || options.output.empty()) {
         throw UsageError("render needs an input file and -o");
     }

@@ -1,11 +1,16 @@
 #include "integrator/integrator.h"
 
+#include "core/check.h"
 #include "integrator/integrator_worker.h"
 #include "integrator/stages.h"
+#include "sampling/sampler.h"
 
 namespace pharos {
 
 namespace {
+
+constexpr std::uint32_t kIncidentSalt = 0x6a09e667u;
+const PassLayout kNoPasses;
 
 // Adds the passes on request of a batch's samples to the film.
 void add_passes(const PathBatch& batch,
@@ -65,6 +70,12 @@ void Integrator::render_batch(const RenderContext& context,
     });
     batch.root_passes.assign(std::size_t{work.pixels} * context.passes.sample_size(), 0.0f);
     statistics.camera_samples += work.pixels;
+    follow_paths(context, worker);
+}
+
+void Integrator::follow_paths(const RenderContext& context, Worker& worker) const {
+    PathBatch& batch = worker.batch;
+    BatchStatistics& statistics = worker.statistics;
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
         timed(
@@ -98,6 +109,38 @@ void Integrator::render_batch(const RenderContext& context,
         return record_radiance(context, batch, worker.records);
     });
     statistics.nonfinite += finish_paths(batch);
+}
+
+void Integrator::trace_incident(std::span<const Ray> rays,
+                                std::uint32_t sample,
+                                std::span<Rgb> radiance) {
+    CHECK_EQ(rays.size(), radiance.size());
+    const RenderContext context{scene_, camera_, filter_, PassSettings{}, {}, kNoPasses};
+    const std::uint32_t seed = context.settings().seed;
+    const std::size_t batches = (rays.size() + kBatchPaths - 1) / kBatchPaths;
+    pool_.parallel_for(batches, [&](std::size_t index, unsigned thread) {
+        PathBatch& batch = workers_[thread]->batch;
+        const std::size_t first = index * kBatchPaths;
+        const std::size_t count = std::min<std::size_t>(kBatchPaths, rays.size() - first);
+        batch.begin(static_cast<std::uint32_t>(count));
+        for (std::uint32_t path = 0; path < count; ++path) {
+            const auto key = static_cast<std::uint32_t>(first) + path;
+            batch.begin_path(path, pixel_hash(seed ^ kIncidentSalt, key, 0), sample);
+            batch.root_pixel[path] = 0;
+            batch.path_visibility[path] = kVisibleDiffuse;
+            PathCounters& counters = batch.counters[path];
+            counters.depth = counters.bounce = counters.diffuse = 1;
+            counters.from_camera = false;
+            counters.after_diffuse = true;
+            batch.active.push_back(path);
+            batch.rays.push_back(rays[first + path]);
+            batch.visibility.push_back(kVisibleDiffuse);
+        }
+        follow_paths(context, *workers_[thread]);
+        for (std::uint32_t path = 0; path < count; ++path) {
+            radiance[first + path] = batch.root_sample[path].radiance;
+        }
+    });
 }
 
 void Integrator::book_training(std::uint64_t records, std::uint64_t nanoseconds) {

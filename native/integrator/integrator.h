@@ -13,6 +13,7 @@
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
+#include <span>
 #include <vector>
 
 #include "core/cancel.h"
@@ -57,6 +58,10 @@ class Integrator {
     // Writes the wanted passes about the guide, as it is now, into the film.
     void render_guide_passes(const GuidingContext& guiding, SharedFilm& film);
 
+    // Radiance that arrives at surfaces along `rays`, one path each: all of it, whatever light
+    // sampling would have found there. As of rays scattered diffusely.
+    void trace_incident(std::span<const Ray> rays, std::uint32_t sample, std::span<Rgb> radiance);
+
     // What the last pass recorded, gathered from all threads (unordered: sort by key).
     [[nodiscard]] RecordBuffer take_records();
 
@@ -73,6 +78,7 @@ class Integrator {
     void render_batch(const RenderContext& context,
                       const struct BatchWork& work,
                       Worker& worker) const;
+    void follow_paths(const RenderContext& context, Worker& worker) const;
     std::uint64_t render_guide_batch(const RenderContext& context,
                                      std::uint32_t first_pixel,
                                      Worker& worker,

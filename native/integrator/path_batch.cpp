@@ -39,4 +39,29 @@ PathBatch::PathBatch(std::uint32_t root_count) : capacity(2 * root_count), max_r
     occluded.reserve(size);
 }
 
+void PathBatch::begin(std::uint32_t count) {
+    roots = count;
+    paths = count;
+    records.clear();
+    active.clear();
+    rays.clear();
+    visibility.clear();
+}
+
+void PathBatch::begin_path(std::uint32_t path, std::uint32_t hash, std::uint32_t sample) {
+    root_sample[path] = FilmSample{};
+    root[path] = path;
+    sampler_hash[path] = hash;
+    sample_index[path] = sample;
+    beta[path] = Rgb(1.0f);
+    radiance[path] = Rgb(0.0f);
+    albedo_product[path] = Rgb(1.0f);
+    scatter_pdf[path] = 0.0f;
+    counters[path] = PathCounters{};
+    path_visibility[path] = kVisibleCamera;
+    last_record[path] = kNone;
+    recorded_radiance[path] = Rgb(0.0f);
+    split_scale[path] = 0.0f;
+}
+
 }  // namespace pharos

@@ -56,6 +56,10 @@ struct PathBatch {
     // `roots` camera samples, and as many again for split paths.
     explicit PathBatch(std::uint32_t max_roots);
 
+    // Empties the batch; begin_path() then starts `count` paths, one of each root.
+    void begin(std::uint32_t count);
+    void begin_path(std::uint32_t path, std::uint32_t hash, std::uint32_t sample);
+
     std::uint32_t capacity;
     std::uint32_t max_roots;
     std::uint32_t roots = 0;  // in use

@@ -21,12 +21,7 @@ std::uint64_t generate_camera_rays(const RenderContext& context,
                                    const BatchWork& work,
                                    PathBatch& batch) {
     const FilmDescription& film = context.scene.description.film;
-    batch.roots = work.pixels;
-    batch.paths = work.pixels;
-    batch.records.clear();
-    batch.active.clear();
-    batch.rays.clear();
-    batch.visibility.clear();
+    batch.begin(work.pixels);
     for (std::uint32_t path = 0; path < work.pixels; ++path) {
         const std::uint32_t pixel = work.first_pixel + path;
         const std::uint32_t x = film.crop_x + pixel % film.crop_width;
@@ -38,18 +33,7 @@ std::uint64_t generate_camera_rays(const RenderContext& context,
                           static_cast<float>(y) + 0.5f + offset.y);
 
         batch.root_pixel[path] = pixel;
-        batch.root_sample[path] = FilmSample{};
-        batch.root[path] = path;
-        batch.sampler_hash[path] = hash;
-        batch.sample_index[path] = work.sample;
-        batch.beta[path] = Rgb(1.0f);
-        batch.radiance[path] = Rgb(0.0f);
-        batch.albedo_product[path] = Rgb(1.0f);
-        batch.scatter_pdf[path] = 0.0f;
-        batch.counters[path] = PathCounters{};
-        batch.path_visibility[path] = kVisibleCamera;
-        batch.last_record[path] = kNone;
-        batch.recorded_radiance[path] = Rgb(0.0f);
+        batch.begin_path(path, hash, work.sample);
         batch.split_scale[path] = is_recorded(context.guiding, hash, work.sample) ? 1.0f : 0.0f;
         batch.active.push_back(path);
         batch.rays.push_back(context.camera.generate_ray(raster, Vec2(u.z, u.w)));

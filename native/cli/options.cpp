@@ -1,0 +1,98 @@
+#include "cli/options.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "film/passes.h"
+
+namespace pharos::cli {
+
+std::vector<std::string> split(const std::string& text, char separator) {
+    std::vector<std::string> parts;
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find(separator, begin), text.size());
+        parts.push_back(text.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return parts;
+}
+
+std::vector<std::uint32_t> parse_list(const std::string& name, const std::string& text) {
+    std::vector<std::uint32_t> values;
+    for (const std::string& part : split(text, ',')) {
+        values.push_back(parse_number<std::uint32_t>(name, part));
+    }
+    return values;
+}
+
+bool parse_switch(const std::string& name, const std::string& text) {
+    if (text != "on" && text != "off") {
+        throw UsageError(name + ": '" + text + "' is neither on nor off");
+    }
+    return text == "on";
+}
+
+GuidingMode parse_guiding(const std::string& text) {
+    std::string lower = text;
+    for (char& c : lower) {
+        c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    if (lower == "off") {
+        return GuidingMode::Off;
+    }
+    if (lower == "neural") {
+        return GuidingMode::Neural;
+    }
+    if (lower == "slides") {
+        return GuidingMode::Slides;
+    }
+    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides");
+}
+
+std::uint32_t parse_passes(const std::string& text) {
+    if (text == "none") {
+        return 0;
+    }
+    if (text == "guide") {
+        return kGuidePasses;
+    }
+    std::uint32_t bits = 0;
+    for (const std::string& name : split(text, ',')) {
+        std::uint32_t found = 0;
+        for (std::size_t i = 0; i < kFilmPasses; ++i) {
+            const auto pass = static_cast<FilmPass>(i);
+            found |= text == "all" || name == film_pass_info(pass).name ? pass_bit(pass) : 0u;
+        }
+        if (found == 0) {
+            throw UsageError("--passes: there is no pass '" + name + "'");
+        }
+        bits |= found;
+    }
+    return bits;
+}
+
+std::string walk_arguments(
+    const std::vector<std::string>& arguments,
+    const std::function<bool(const std::string&)>& flag,
+    const std::function<void(const std::string&, const std::string&)>& option) {
+    std::string input;
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+        const std::string& argument = arguments[i];
+        if (flag(argument)) {
+            continue;
+        }
+        if (argument.starts_with("-")) {
+            if (i + 1 == arguments.size()) {
+                throw UsageError(argument + " needs a value");
+            }
+            option(argument, arguments[++i]);
+        } else if (input.empty()) {
+            input = argument;
+        } else {
+            throw UsageError("one input file only, not also '" + argument + "'");
+        }
+    }
+    return input;
+}
+
+}  // namespace pharos::cli

@@ -1,0 +1,41 @@
+// Words of the command line to values; what does not fit throws UsageError naming the option.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cli/commands.h"
+#include "scene/scene_description.h"
+
+namespace pharos::cli {
+
+template <class T>
+[[nodiscard]] T parse_number(const std::string& name, const std::string& text) {
+    T value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size()) {
+        throw UsageError(name + ": '" + text + "' is not a number");
+    }
+    return value;
+}
+
+[[nodiscard]] std::vector<std::string> split(const std::string& text, char separator);
+[[nodiscard]] std::vector<std::uint32_t> parse_list(const std::string& name,
+                                                    const std::string& text);
+[[nodiscard]] bool parse_switch(const std::string& name, const std::string& text);
+[[nodiscard]] GuidingMode parse_guiding(const std::string& text);
+
+// "Position,Guide Kappa" or one of the words all, guide, none: the bits of the passes.
+[[nodiscard]] std::uint32_t parse_passes(const std::string& text);
+
+// Walks over the arguments: `flag` says whether a word stands alone, `option` takes a name and its
+// value. Returns the one word that is neither, the input file.
+[[nodiscard]] std::string walk_arguments(
+    const std::vector<std::string>& arguments,
+    const std::function<bool(const std::string&)>& flag,
+    const std::function<void(const std::string&, const std::string&)>& option);
+
+}  // namespace pharos::cli
