@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 
 #include "core/cancel.h"
@@ -176,6 +177,14 @@ FieldProbe probe_field(SceneDescription description,
         throw std::invalid_argument("field: the grid or the number of rays is zero");
     }
     const CancelFlag never;
+    // The truth is the same with light sampling, and far less noisy.
+    std::unique_ptr<const Scene> lit;
+    if (!description.settings.use_nee) {
+        SceneDescription sampled = description;
+        sampled.settings.use_nee = true;
+        SceneReport again;
+        lit = build_scene(std::move(sampled), never, again);
+    }
     const auto scene = build_scene(std::move(description), never, report);
     const SurfaceInteraction surface = first_hit(*scene, settings);
     const bool slides = scene->description.settings.guiding == GuidingMode::Slides;
@@ -197,7 +206,12 @@ FieldProbe probe_field(SceneDescription description,
     probe.learned.resize(std::size_t{probe.width} * probe.height);
     probe.truth.resize(probe.learned.size());
     draw_learned(probe);
-    draw_truth(*scene, surface, settings, integrator, probe);
+    if (lit) {
+        Integrator with_lights(*lit, pool);
+        draw_truth(*lit, surface, settings, with_lights, probe);
+    } else {
+        draw_truth(*scene, surface, settings, integrator, probe);
+    }
     probe.divergence = latlong_divergence(probe.truth, probe.learned, probe.height);
     probe.weights = field.save();
     return probe;
