@@ -15,7 +15,7 @@ from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
 from .export.scene import export_scene, set_view
-from .passes import PASSES, PassRequest, wanted_passes
+from .passes import PASSES, PassRequest, name_unsupported_passes, wanted_passes
 
 _POLL = 0.05  # seconds between looks at the session and at Blender's Esc
 _FIRST_RESULT = 0.1
@@ -91,6 +91,7 @@ class FinalRender:
     def _export(self, frame, crop):
         engine, scene = self._engine, self._scene
         engine.update_stats("", "Exporting scene")
+        name_unsupported_passes(self._layer, self._report)
         camera = scene.camera
         if camera is None or camera.type != "CAMERA":
             engine.report({"ERROR"}, "Pharos: the scene has no camera.")

@@ -53,6 +53,26 @@ _CYCLES_SWITCHES = {
     "pharos.use_pass_denoising": "denoising_store_passes",
     "pharos.use_pass_sample_count": "pass_debug_sample_count",
 }
+# Switches of view layers, and of Cycles there, that ask for what Pharos does not deliver.
+_UNSUPPORTED = {
+    "use_pass_vector": "Vector",
+    "use_pass_shadow": "Shadow",
+    "use_pass_ambient_occlusion": "Ambient Occlusion",
+    **{
+        f"use_pass_{lobe}_{part}": f"{lobe.capitalize()} {part.capitalize()}"
+        for lobe in ("diffuse", "glossy", "transmission", "subsurface")
+        for part in ("direct", "indirect", "color")
+    },
+    **{
+        f"use_pass_cryptomatte_{kind}": f"Cryptomatte {kind.capitalize()}"
+        for kind in ("object", "material", "asset")
+    },
+}
+_UNSUPPORTED_CYCLES = {
+    "use_pass_volume_direct": "Volume Direct",
+    "use_pass_volume_indirect": "Volume Indirect",
+    "use_pass_shadow_catcher": "Shadow Catcher",
+}
 _MIST_EXPONENTS = {"LINEAR": 1.0, "QUADRATIC": 2.0, "INVERSE_QUADRATIC": 0.5}
 
 
@@ -67,6 +87,17 @@ def _is_wanted(view_layer, switch: str) -> bool:
 def wanted_passes(view_layer) -> list[Pass]:
     """Passes beside Combined that a view layer asks for."""
     return [entry for entry in PASSES if _is_wanted(view_layer, entry.switch)]
+
+
+def name_unsupported_passes(view_layer, report) -> None:
+    """Put the passes that stay black, and those that are missing, into the report."""
+    cycles = getattr(view_layer, "cycles", None)
+    names = [n for switch, n in _UNSUPPORTED.items() if getattr(view_layer, switch, False)]
+    names += [n for switch, n in _UNSUPPORTED_CYCLES.items() if getattr(cycles, switch, False)]
+    names += [f"AOV {aov.name}" for aov in view_layer.aovs]
+    names += [f"Light Group {group.name}" for group in getattr(view_layer, "lightgroups", ())]
+    for name in names:
+        report.warn(view_layer.name, f"Pass {name!r} is not supported.")
 
 
 class PassRequest:

@@ -174,6 +174,23 @@ def test_guide_passes_without_guiding_are_black():
     assert len(guide) == 6 and not np.any(guide)
 
 
+def test_unsupported_passes_are_named():
+    harness.new_scene(8, 8, 1)
+    harness.add_camera()
+    layer = bpy.context.view_layer
+    layer.use_pass_diffuse_direct = layer.use_pass_vector = layer.use_pass_mist = True
+    layer.aovs.add().name = "Mask"
+    try:
+        harness.render()
+        named = [line.split(": ", 1)[1] for line in harness.report()]
+    finally:
+        layer.use_pass_diffuse_direct = layer.use_pass_vector = layer.use_pass_mist = False
+        bpy.ops.scene.view_layer_remove_aov()
+    names = ("Vector", "Diffuse Direct", "AOV Mask")
+    assert named == [f"Pass {name!r} is not supported." for name in names], named
+    assert not layer.aovs
+
+
 def test_names_agree_with_the_native_module():
     passes = __import__("pharos.passes", fromlist=["PASSES"]).PASSES
     module = harness.native()

@@ -89,9 +89,14 @@ def name_ignored_settings(scene, report) -> None:
     """Settings that change a picture in Cycles and do nothing here."""
     if scene.render.use_motion_blur:
         report.warn(scene.name, "Motion blur is not supported.")
+    if scene.render.use_freestyle:
+        report.warn(scene.name, "Freestyle is not supported.")
+    name_light_linking(scene, report)
     cycles = _followed_cycles(scene)
     if cycles is None:
         return
+    if cycles.use_denoising:
+        report.info(scene.name, "The picture is not denoised.")
     if cycles.sample_clamp_direct > 0.0 or cycles.sample_clamp_indirect > 0.0:
         report.info(scene.name, "Clamping of samples is not used.")
     if cycles.use_fast_gi:
@@ -102,3 +107,15 @@ def name_ignored_settings(scene, report) -> None:
         report.info(scene.name, "Filter glossy is not used.")
     if cycles.min_light_bounces > 0:
         report.info(scene.name, "Minimum bounces are not used.")
+    if scene.render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull):
+        report.info(scene.name, "Culling of objects is not used.")
+
+
+def name_light_linking(scene, report) -> None:
+    """Lights that should shine on some objects only, or throw no shadow of some (since 4.0)."""
+    for obj in scene.objects:
+        linking = getattr(obj, "light_linking", None)
+        if linking is None:
+            return
+        if linking.receiver_collection is not None or linking.blocker_collection is not None:
+            report.warn(obj.name, "Light linking is not supported.")
