@@ -69,10 +69,13 @@ class _PharosPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     COMPAT_ENGINES = {_ENGINE}
+    owner_name = ""  # attribute of the context that has to be there
 
     @classmethod
     def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
+        if context.engine not in cls.COMPAT_ENGINES:
+            return False
+        return not cls.owner_name or getattr(context, cls.owner_name, None) is not None
 
 
 class _RenderPanel(_PharosPanel):
@@ -285,13 +288,8 @@ class _TreePanel(_PharosPanel):
     """The node tree behind an output, or what stands for it without nodes."""
 
     bl_label = "Surface"
-    owner_name = ""  # attribute of the context
     output_type = ""
     plain = ("", {})  # property shown without nodes
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and getattr(context, cls.owner_name) is not None
 
     def draw(self, context):
         layout, owner = self.layout, getattr(context, self.owner_name)
@@ -316,10 +314,7 @@ class PHAROS_MATERIAL_PT_settings(_PharosPanel, bpy.types.Panel):
     bl_label = "Settings"
     bl_context = "material"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.material is not None
+    owner_name = "material"
 
     def draw(self, context):
         _settings_layout(self).prop(context.material, "pass_index")
@@ -334,10 +329,7 @@ class PHAROS_WORLD_PT_surface(_TreePanel, bpy.types.Panel):
 class PHAROS_LIGHT_PT_light(_PharosPanel, bpy.types.Panel):
     bl_label = "Light"
     bl_context = "data"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.light is not None
+    owner_name = "light"
 
     def draw(self, context):
         layout, light = self.layout, context.light
@@ -392,10 +384,7 @@ class PHAROS_OBJECT_PT_visibility(_PharosPanel, bpy.types.Panel):
     bl_label = "Ray Visibility"
     bl_context = "object"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.object is not None
+    owner_name = "object"
 
     def draw(self, context):
         layout = self.layout

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
-#include <optional>
 
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -15,34 +14,19 @@ namespace pharos::cli {
 
 namespace {
 
-struct Options {
-    std::string input;
-    std::string output;
+struct Options : CommonOptions {
     std::string load;
     std::string save;
     std::vector<std::uint32_t> pixel;
-    std::optional<std::uint32_t> samples;
-    std::optional<std::uint32_t> seed;
-    std::optional<bool> nee;
-    std::optional<GuidingMode> guiding;
     ProbeSettings probe;
 };
 
 void parse_option(const std::string& name, const std::string& value, Options& options) {
-    if (name == "-o" || name == "--output") {
-        options.output = value;
-    } else if (name == "--pixel") {
+    if (options.take(name, value)) {
+        return;
+    }
+    if (name == "--pixel") {
         options.pixel = parse_list(name, value);
-    } else if (name == "--samples") {
-        options.samples = parse_number<std::uint32_t>(name, value);
-    } else if (name == "--seed") {
-        options.seed = parse_number<std::uint32_t>(name, value);
-    } else if (name == "--threads") {
-        options.probe.threads = parse_number<unsigned>(name, value);
-    } else if (name == "--guiding") {
-        options.guiding = parse_guiding(value);
-    } else if (name == "--nee") {
-        options.nee = parse_switch(name, value);
     } else if (name == "--load") {
         options.load = value;
     } else if (name == "--save") {
@@ -69,15 +53,9 @@ Options parse(const std::vector<std::string>& arguments) {
     }
     options.probe.x = options.pixel[0];
     options.probe.y = options.pixel[1];
+    options.probe.threads = options.threads;
     options.probe.train = options.load.empty() || options.samples.has_value();
     return options;
-}
-
-void apply(const Options& options, RenderSettings& settings) {
-    settings.samples = options.samples.value_or(settings.samples);
-    settings.seed = options.seed.value_or(settings.seed);
-    settings.use_nee = options.nee.value_or(settings.use_nee);
-    settings.guiding = options.guiding.value_or(settings.guiding);
 }
 
 std::vector<std::byte> read_bytes(const std::string& path) {
@@ -174,7 +152,7 @@ int field(const std::vector<std::string>& arguments) {
         options.probe.weights = weights;
     }
     SceneDescription description = read_dump(options.input);
-    apply(options, description.settings);
+    options.apply(description.settings);
     SceneReport report;
     const FieldProbe probe = probe_field(std::move(description), options.probe, report);
     for (const ReportEntry& entry : report.entries()) {

@@ -71,6 +71,32 @@ std::uint32_t parse_passes(const std::string& text) {
     return bits;
 }
 
+bool CommonOptions::take(const std::string& name, const std::string& value) {
+    if (name == "-o" || name == "--output") {
+        output = value;
+    } else if (name == "--samples") {
+        samples = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--seed") {
+        seed = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--threads") {
+        threads = parse_number<unsigned>(name, value);
+    } else if (name == "--guiding") {
+        guiding = parse_guiding(value);
+    } else if (name == "--nee") {
+        nee = parse_switch(name, value);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+void CommonOptions::apply(RenderSettings& settings) const {
+    settings.samples = samples.value_or(settings.samples);
+    settings.seed = seed.value_or(settings.seed);
+    settings.use_nee = nee.value_or(settings.use_nee);
+    settings.guiding = guiding.value_or(settings.guiding);
+}
+
 std::string walk_arguments(
     const std::vector<std::string>& arguments,
     const std::function<bool(const std::string&)>& flag,

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,21 @@ template <class T>
 
 // "Position,Guide Kappa" or one of the words all, guide, none: the bits of the passes.
 [[nodiscard]] std::uint32_t parse_passes(const std::string& text);
+
+// What every command that renders a dump takes.
+struct CommonOptions {
+    std::string input;
+    std::string output;
+    std::optional<std::uint32_t> samples;
+    std::optional<std::uint32_t> seed;
+    std::optional<bool> nee;
+    std::optional<GuidingMode> guiding;
+    unsigned threads = 0;
+
+    // False for an option of another name.
+    [[nodiscard]] bool take(const std::string& name, const std::string& value);
+    void apply(RenderSettings& settings) const;
+};
 
 // Walks over the arguments: `flag` says whether a word stands alone, `option` takes a name and its
 // value. Returns the one word that is neither, the input file.

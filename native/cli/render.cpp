@@ -21,15 +21,8 @@ extern "C" void remember_signal(int signal) {
     received_signal = signal;
 }
 
-struct Options {
-    std::string input;
-    std::string output;
-    std::optional<std::uint32_t> samples;
-    std::optional<std::uint32_t> seed;
+struct Options : CommonOptions {
     std::optional<float> time_limit;
-    std::optional<bool> nee;
-    std::optional<GuidingMode> guiding;
-    unsigned threads = 0;
     std::vector<std::uint32_t> snapshots;
     std::optional<std::uint32_t> passes;
     bool stats = false;
@@ -37,20 +30,11 @@ struct Options {
 };
 
 void parse_option(const std::string& name, const std::string& value, Options& options) {
-    if (name == "-o" || name == "--output") {
-        options.output = value;
-    } else if (name == "--samples") {
-        options.samples = parse_number<std::uint32_t>(name, value);
-    } else if (name == "--seed") {
-        options.seed = parse_number<std::uint32_t>(name, value);
-    } else if (name == "--threads") {
-        options.threads = parse_number<unsigned>(name, value);
-    } else if (name == "--time-limit") {
+    if (options.take(name, value)) {
+        return;
+    }
+    if (name == "--time-limit") {
         options.time_limit = parse_number<float>(name, value);
-    } else if (name == "--guiding") {
-        options.guiding = parse_guiding(value);
-    } else if (name == "--nee") {
-        options.nee = parse_switch(name, value);
     } else if (name == "--snapshots") {
         options.snapshots = parse_list(name, value);
     } else if (name == "--passes") {
@@ -77,14 +61,6 @@ Options parse(const std::vector<std::string>& arguments) {
         throw UsageError("render needs an input file and -o");
     }
     return options;
-}
-
-void apply(const Options& options, RenderSettings& settings) {
-    settings.samples = options.samples.value_or(settings.samples);
-    settings.seed = options.seed.value_or(settings.seed);
-    settings.time_limit = options.time_limit.value_or(settings.time_limit);
-    settings.use_nee = options.nee.value_or(settings.use_nee);
-    settings.guiding = options.guiding.value_or(settings.guiding);
 }
 
 // OUT.exr -> OUT.64.exr
@@ -234,7 +210,8 @@ int wait_for_end(RenderSession& session) {
 int render(const std::vector<std::string>& arguments) {
     const Options options = parse(arguments);
     SceneDescription description = read_dump(options.input);
-    apply(options, description.settings);
+    options.apply(description.settings);
+    description.settings.time_limit = options.time_limit.value_or(description.settings.time_limit);
     description.passes.wanted = options.passes.value_or(description.passes.wanted);
     RenderSession session(std::move(description), options.threads, options.snapshots);
     const int code = wait_for_end(session);
