@@ -17,6 +17,41 @@ def test_engine_and_settings():
     assert names == {"OFF", "NEURAL", "SLIDES"}, names
 
 
+def test_switch_for_guiding():
+    """The panel's switch and its choice of a guide are two views of one setting."""
+    own = harness.new_scene().pharos
+    own.guiding_mode = "NEURAL"
+    assert own.guiding == "OFF" and not own.use_guiding
+    own.use_guiding = True
+    assert own.guiding == "NEURAL"
+    own.guiding_mode = "SLIDES"
+    assert own.guiding == "SLIDES" and own.use_guiding
+    own.use_guiding = False
+    assert own.guiding == "OFF" and own.guiding_mode == "SLIDES"
+    own.use_guiding = True
+    assert own.guiding == "SLIDES"
+    own.guiding = "NEURAL"
+    assert own.guiding_mode == "NEURAL"
+    own.guiding = "OFF"
+    panel = bpy.types.PHAROS_RENDER_PT_advanced
+    assert panel.bl_parent_id == "PHAROS_RENDER_PT_sampling"
+    assert panel.bl_options == {"DEFAULT_CLOSED"}
+
+
+def test_statistics_line_tells_of_the_guide():
+    stats_line = importlib.import_module("pharos.final").stats_line
+    harness.new_scene(16, 16, 4)
+    harness.add_camera(location=(0.0, 0.0, 0.5))
+    harness.add_object(harness.cube_mesh(), harness.emission())
+    for guiding, words in (("OFF", ""), ("SLIDES", "Guiding ")):
+        bpy.context.scene.pharos.guiding = guiding
+        session = harness.native().RenderSession(harness.exported(), 1)
+        assert session.wait(60.0)
+        line = stats_line(session.progress())
+        assert words in line and line.startswith("Sample 4/4"), line
+        assert bool(words) == ("Guiding" in line), line
+
+
 def test_usual_panels_show():
     panels = {panel.__name__: panel for panel in bpy.types.Panel.__subclasses__()}
     for name in ("DATA_PT_lens", "DATA_PT_camera_dof", "RENDER_PT_format", "RENDER_PT_output"):
