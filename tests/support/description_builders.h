@@ -224,6 +224,20 @@ class ProgramBuilder {
     return b.build();
 }
 
+// A sheet that lets a third of what it scatters through, mirrors a third, and emits.
+[[nodiscard]] inline NodeProgram sheet_emission_program(const Rgb& albedo, const Rgb& emitted) {
+    ProgramBuilder b;
+    const std::int32_t one = b.color(Vec3(1));
+    const std::int32_t third = b.color(albedo / 3.0f);
+    b.closure(NodeOpCode::Translucent, 0, {one, third, kDefaultOperand});
+    b.closure(NodeOpCode::Diffuse, 0, {one, third, b.scalar(0.0f), kDefaultOperand});
+    b.closure(NodeOpCode::Glossy,
+              static_cast<std::uint16_t>(Distribution::Ggx),
+              {one, third, b.scalar(0.0f), kDefaultOperand});
+    b.closure(NodeOpCode::Emission, 0, {one, b.color(emitted), b.scalar(1.0f)});
+    return b.build();
+}
+
 [[nodiscard]] inline NodeProgram background_program(const Rgb& color, float strength) {
     ProgramBuilder b;
     b.closure(NodeOpCode::Background, 0, {b.color(Vec3(1)), b.color(color), b.scalar(strength)});
