@@ -25,7 +25,7 @@ def reason(case):
     if failure is not None and not kept:
         kept = [failure.get("message", ""), *said[-2:]]
     # Paths of the machine say nothing: the file's name does.
-    return re.sub(r"(?:/[\w.+-]+)+/(?=[\w.+-]+:\d)", "", " | ".join(kept))[:_LONGEST]
+    return re.sub(r"(?:[\w.+-]*/)+(?=[\w.+-]+:\d)", "", " | ".join(kept))[:_LONGEST]
 
 
 def main(path):

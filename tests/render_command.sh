@@ -61,12 +61,12 @@ stops_once() {
     [ "$status" = "$code" ] && has_light "$renders/door.exr" && has_light "$renders/door.png"
 }
 
-# Within five seconds; a machine may stall, so that the best of three counts.
+# Within ten seconds; a machine may stall, so that the best of three counts.
 stops_on() {
     local took
     for _ in 1 2 3; do
         stops_once "$@" || return
-        [ "$took" -gt 5 ] || return 0
+        [ "$took" -gt 10 ] || return 0
     done
     return 1
 }

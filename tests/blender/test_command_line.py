@@ -114,7 +114,7 @@ def test_dump_beside_a_render():
     assert (FOLDER / "beside_0001.exr").exists(), text
 
 
-_SECONDS_TO_END = 5.0
+_SECONDS_TO_END = 10.0
 
 
 def _interrupt(number: int) -> tuple[int, float, Path, str]:
