@@ -72,6 +72,7 @@ void bind_codes(py::module_& m) {
                                            {"Bump", E::Bump},
                                            {"Attribute", E::Attribute},
                                            {"InstanceAttribute", E::InstanceAttribute},
+                                           {"Tangent", E::Tangent},
                                            {"Diffuse", E::Diffuse},
                                            {"Glossy", E::Glossy},
                                            {"Glass", E::Glass},
@@ -81,7 +82,12 @@ void bind_codes(py::module_& m) {
                                            {"Emission", E::Emission},
                                            {"Background", E::Background},
                                            {"PrincipledV1", E::PrincipledV1},
-                                           {"PrincipledV2", E::PrincipledV2}});
+                                           {"PrincipledV2", E::PrincipledV2},
+                                           {"Anisotropic", E::Anisotropic},
+                                           {"Metallic", E::Metallic},
+                                           {"Toon", E::Toon},
+                                           {"Velvet", E::Velvet},
+                                           {"Sheen", E::Sheen}});
     }
 }
 
@@ -323,6 +329,7 @@ void bind_node_enums(py::module_& m) {
     m.attr("STEP_BIT") = static_cast<int>(kStepBit);
     m.attr("EXTRAPOLATE_BIT") = static_cast<int>(kExtrapolateBit);
     m.attr("INVERT_BIT") = static_cast<int>(kInvertBit);
+    m.attr("PHYSICAL_BIT") = static_cast<int>(kPhysicalBit);
     m.attr("NORMALIZE_NOISE_BIT") = static_cast<int>(kNormalizeNoiseBit);
     m.attr("COLOR_NOISE_BIT") = static_cast<int>(kColorNoiseBit);
     m.attr("LEGACY_NOISE_BIT") = static_cast<int>(kLegacyNoiseBit);

@@ -6,6 +6,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings/bindings.h"
+#include "materials/material.h"
 #include "materials/node_program.h"
 #include "materials/procedural_hash.h"
 
@@ -67,6 +68,14 @@ double random_of_name(const std::string& name) {
 }  // namespace
 
 void bind_programs(py::module_& m) {
+    m.def(
+        "mean_emission",
+        [](const NodeProgram& program) {
+            const MeanEmission e = mean_emission(program);
+            return std::make_tuple(e.mean.x, e.mean.y, e.mean.z, e.constant);
+        },
+        FloatGuard(),
+        py::arg("program"));
     m.def("random_of_name", &random_of_name, FloatGuard(), py::arg("name"));
 
     py::class_<ImageUse>(m, "ImageUse", py::module_local())

@@ -36,6 +36,8 @@ struct PathCounters {
     bool after_diffuse = false;  // some scattering so far was diffuse (caustics switches)
     bool features_done = false;  // albedo and normal for denoising are taken
     bool passes_done = false;    // passes of a single surface are taken
+    std::uint8_t ray_kind = 1;   // PathInfo::kind of the ray under way: the camera's
+    float straight_length = 0.0f;  // of the ray's parts before transparent surfaces
 };
 
 // A shadow ray waiting for its answer.
@@ -127,6 +129,8 @@ struct PathBatch {
     std::vector<SurfaceInteraction> pending_surfaces;
     std::vector<Vec3> pending_directions;
     std::vector<Rgb> pending_radiance;
+
+    std::vector<PathInfo> path_infos;  // where programs ask how paths came
 
     ShadingScratch scratch;
 };

@@ -12,6 +12,8 @@
 #include "materials/lobes/diffuse.h"
 #include "materials/lobes/ggx.h"
 #include "materials/lobes/sheen.h"
+#include "materials/lobes/toon.h"
+#include "materials/lobes/velvet.h"
 #include "materials/microfacet.h"
 #include "sampling/warps.h"
 
@@ -40,6 +42,11 @@ namespace {
             return eval_clearcoat(c, wo, wi);
         case ClosureType::Sheen:
             return c.smith != 0 ? eval_sheen_v1(c, wo, wi) : eval_sheen_ltc(c, wi);
+        case ClosureType::ToonDiffuse:
+        case ClosureType::ToonGlossy:
+            return eval_toon(c, wo, wi);
+        case ClosureType::Velvet:
+            return eval_velvet(c, wo, wi);
     }
     return {};
 }
@@ -64,6 +71,11 @@ namespace {
                 return sample_sheen_ltc(c, u);
             }
             break;
+        case ClosureType::ToonDiffuse:
+        case ClosureType::ToonGlossy:
+            return sample_toon(c, wo, u);
+        case ClosureType::Velvet:
+            return Frame::from_z(c.n).to_world(sample_uniform_cone(u, 1.0f));
         case ClosureType::Translucent:
             return Frame::from_z(-c.n).to_world(sample_cosine_hemisphere(u));
         default:
@@ -79,6 +91,8 @@ namespace {
         case ClosureType::GgxGlass:
         case ClosureType::Clearcoat:
             return transmitted ? kLobeGlossy | kLobeTransmission : kLobeGlossy;
+        case ClosureType::ToonGlossy:
+            return kLobeGlossy;
         case ClosureType::Translucent:
             return kLobeDiffuse | kLobeTransmission;
         default:

@@ -29,6 +29,9 @@ enum class ClosureType : std::uint8_t {
     GgxGlass,   // reflection and refraction with one half vector
     Clearcoat,  // GTR1 (Principled v1)
     Sheen,
+    ToonDiffuse,
+    ToonGlossy,
+    Velvet,
 };
 
 enum class FresnelType : std::uint8_t {
@@ -45,7 +48,7 @@ struct Closure {
     float sample_weight = 0.0f;  // probability before normalisation; >= 0
     Vec3 n;                      // the closure's own shading normal
     float alpha_x = 0.0f;
-    Vec3 tangent;  // unit, for alpha_x != alpha_y; more: lobes/diffuse.h, sheen.h
+    Vec3 tangent;  // unit, for alpha_x != alpha_y; more: lobes/diffuse.h, sheen.h, toon.h
     float alpha_y = 0.0f;
     Rgb f0{0.0f};
     float eta = 1.0f;  // transmitted / incident index for wo's side

@@ -76,6 +76,10 @@ ClosureAlbedo closure_albedo(const Closure& c, const Vec3& wo) {
         case ClosureType::Sheen:
             return {c.weight * (c.smith != 0 ? schlick_weight(mu) * mu : c.energy_scale),
                     Rgb(0.0f)};
+        case ClosureType::ToonDiffuse:
+        case ClosureType::ToonGlossy:
+        case ClosureType::Velvet:
+            return {c.weight, Rgb(0.0f)};
     }
     return {};
 }

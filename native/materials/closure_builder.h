@@ -67,6 +67,9 @@ void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupCo
 // For glass Blender colours them by the transmission tint.
 void preserve_glass_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx);
 
+// The microfibre sheen of 4.x as seen along wo: its transformed cosine and its albedo.
+void shape_sheen(Closure& c, float roughness, const ClosureSetupContext& ctx);
+
 // Fills the sample weight and adds the closure, unless its weight is negligible. Returns its
 // directional albedo, weight included.
 Rgb add_closure(Closure& c, const ClosureSetupContext& ctx, ClosureSink& sink);

@@ -59,6 +59,14 @@ struct ScatterInputs {
     float ior = 1.45f;
     Vec3 normal;
     Distribution distribution = Distribution::Ggx;
+    // Special nodes; toon's size and velvet's sigma are the roughness.
+    float anisotropy = 0.0f;
+    float rotation = 0.0f;  // turns
+    Vec3 tangent;           // zero: ctx.tangent
+    Rgb edge{1.0f};         // metallic: tint towards grazing, or extinction
+    float smooth = 0.0f;    // toon
+    bool physical = false;  // metallic: color and edge are complex indices
+    bool glossy = false;    // toon
 };
 
 void setup_diffuse(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
@@ -67,6 +75,12 @@ void setup_glass(const ScatterInputs& in, const ClosureSetupContext& ctx, Closur
 void setup_refraction(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
 void setup_transparent(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
 void setup_translucent(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
+
+void setup_anisotropic(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
+void setup_metallic(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
+void setup_toon(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
+void setup_velvet(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
+void setup_sheen(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink);
 
 // Principled BSDF of Blender 3.x; fields in operand order.
 struct PrincipledV1Inputs {

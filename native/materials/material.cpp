@@ -358,6 +358,7 @@ void Compiler::take_slices() {
             m.straight_alpha[op.mode] = live[static_cast<std::size_t>(op.output) + 3];
             m.textured = true;
         }
+        m.asks_path = m.asks_path || op.code == NodeOpCode::LightPath;
     }
     m.max_closures = std::min(m.max_closures, static_cast<std::uint32_t>(kMaxClosures));
     m.constant = m.surface.values.empty();
@@ -424,7 +425,11 @@ void Compiler::renumber() {
     ShadingContext context;
     context.textures = textures;
     scratch.registers.resize(material.program.register_count * hits.size());
-    Evaluation e{material, context, scratch, hits, {}, {}, hits.size()};
+    // As light sees it: no ray of the camera's.
+    PathInfo light_ray;
+    light_ray.kind = 0;
+    const std::vector<PathInfo> paths(hits.size(), light_ray);
+    Evaluation e{material, context, scratch, hits, paths, {}, hits.size()};
     e.registers = scratch.registers.data();
     e.estimate = true;
     std::vector<Rgb> values(hits.size());
@@ -454,6 +459,12 @@ Material compile_material(std::string name,
     material.name = std::move(name);
     material.emission_estimate = estimate_emission(material, textures);
     return material;
+}
+
+MeanEmission mean_emission(const NodeProgram& program) {
+    SceneReport report;
+    const Material material = compile_material("", program, report);
+    return {material.emission_estimate, material.emission.values.empty()};
 }
 
 }  // namespace pharos

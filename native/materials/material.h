@@ -40,6 +40,7 @@ struct Material {
     bool transparent = false;  // holds a Transparent closure: shadow rays must ask it
     bool transmits = false;    // light arrives from behind the shading normal
     bool textured = false;     // reads an image
+    bool asks_path = false;    // of what kind the ray is, or how deep
     bool emission_sampling = true;
     Rgb emission_estimate{0.0f};  // mean emitted radiance, for light choice
 };
@@ -52,6 +53,15 @@ struct Material {
                                         SceneReport& report,
                                         std::span<const Texture> textures = {});
 
+// Mean emission of a program over made-up hits, and whether it is the same at all of them: what a
+// lamp's node tree multiplies its strength with.
+struct MeanEmission {
+    Rgb mean{0.0f};
+    bool constant = true;
+};
+
+[[nodiscard]] MeanEmission mean_emission(const NodeProgram& program);
+
 // What the Light Path node tells of the ray that made a hit.
 struct PathInfo {
     std::uint16_t kind = 1;  // bit LightPathOutput::Is...: the default is a camera ray
@@ -60,6 +70,7 @@ struct PathInfo {
     std::uint8_t glossy_depth = 0;
     std::uint8_t transparent_depth = 0;
     std::uint8_t transmission_depth = 0;
+    float length_before = 0.0f;  // of the ray up to the transparent surface it last went through
 };
 
 // What programs read besides the hits. All spans outlive the call.

@@ -94,6 +94,8 @@ enum class NodeOpCode : std::uint16_t {
     Attribute = 45,          // mode = name index of a mesh's attribute or uv map
                              // -> 5 (color or vector, alpha, mean); 0 where there is none
     InstanceAttribute = 46,  // mode = name index of an attribute of instances -> 5 likewise
+    Tangent = 47,  // mode = axis of the object it turns around, or 3 + 4 x (name index + 1): along
+                   // growing u of that uv map, 3: of the first -> 3
     // --- closures; weight:3 is always the first operand ---
     Diffuse = 100,       // weight:3 color:3 roughness:1 normal:3
     Glossy = 101,        // weight:3 color:3 roughness:1 normal:3; mode = Distribution
@@ -105,6 +107,14 @@ enum class NodeOpCode : std::uint16_t {
     Background = 107,    // weight:3 color:3 strength:1
     PrincipledV1 = 108,  // weight:3, then kPrincipledV1Operands; mode = Distribution
     PrincipledV2 = 109,  // weight:3, then kPrincipledV2Operands; mode = Distribution
+    Anisotropic = 110,   // weight:3 color:3 roughness:1 anisotropy:1 rotation:1 tangent:3 normal:3;
+                         // mode = Distribution
+    Metallic = 111,      // weight:3 base:3 edge:3 roughness:1 anisotropy:1 rotation:1 tangent:3
+                         // normal:3; mode = Distribution | kPhysicalBit: base and edge are the
+                         // complex index of refraction
+    Toon = 112,          // weight:3 color:3 size:1 smooth:1 normal:3; mode = 0 diffuse, 1 glossy
+    Velvet = 113,        // weight:3 color:3 sigma:1 normal:3
+    Sheen = 114,         // weight:3 color:3 roughness:1 normal:3
 };
 
 enum class GeometryOutput : std::uint16_t {
@@ -277,6 +287,7 @@ inline constexpr std::uint16_t kClampFactorBit = 0x4000;
 inline constexpr std::uint16_t kStepBit = 0x8000;
 inline constexpr std::uint16_t kExtrapolateBit = 0x8000;
 inline constexpr std::uint16_t kInvertBit = 0x8000;
+inline constexpr std::uint16_t kPhysicalBit = 0x8000;
 inline constexpr std::uint16_t kNormalizeNoiseBit = 0x20;
 inline constexpr std::uint16_t kColorNoiseBit = 0x40;
 inline constexpr std::uint16_t kLegacyNoiseBit = 0x80;  // Blender 3.x

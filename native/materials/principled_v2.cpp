@@ -5,7 +5,6 @@
 #include "materials/closure_builder.h"
 #include "materials/closure_setup.h"
 #include "materials/fresnel.h"
-#include "materials/sheen_fit.h"
 
 namespace pharos {
 
@@ -42,15 +41,7 @@ void add_sheen(const PrincipledV2Inputs& in,
     c.type = ClosureType::Sheen;
     c.weight = layers.weight * tint;
     c.n = normalize_or(lerp(layers.normal, layers.coat_normal, layers.coat), layers.normal);
-    const float mu = saturate(glm::dot(c.n, ctx.wo));
-    const SheenLtc ltc = sheen_ltc(mu, bounded(in.sheen_roughness, 1e-3f, 1.0f));
-    c.alpha_x = ltc.a;
-    c.alpha_y = ltc.b;
-    c.energy_scale = ltc.albedo;
-    c.tangent = tangent_around(c.n, ctx.wo);
-    if (is_zero(c.tangent)) {
-        c.tangent = Frame::from_z(c.n).x;
-    }
+    shape_sheen(c, in.sheen_roughness, ctx);
     layers.weight = below_layer(layers.weight, add_closure(c, ctx, sink));
 }
 

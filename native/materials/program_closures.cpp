@@ -45,8 +45,25 @@ void read_inputs(const Evaluation& e,
     OperandReader in(e, op, lane);
     inputs.weight = in.vector();
     inputs.color = in.vector();
-    inputs.distribution = static_cast<Distribution>(op.mode);
+    inputs.distribution = static_cast<Distribution>(op.mode & 7);
     switch (op.code) {
+        case NodeOpCode::Metallic:
+            inputs.edge = in.vector();
+            inputs.physical = (op.mode & kPhysicalBit) != 0;
+            [[fallthrough]];
+        case NodeOpCode::Anisotropic:
+            inputs.roughness = in.scalar();
+            inputs.anisotropy = in.scalar();
+            inputs.rotation = in.scalar();
+            inputs.tangent = in.vector_or(Vec3(0.0f));
+            break;
+        case NodeOpCode::Toon:
+            inputs.roughness = in.scalar();
+            inputs.smooth = in.scalar();
+            inputs.glossy = op.mode != 0;
+            break;
+        case NodeOpCode::Velvet:
+        case NodeOpCode::Sheen:
         case NodeOpCode::Diffuse:
         case NodeOpCode::Glossy:
             inputs.roughness = in.scalar();
@@ -170,6 +187,10 @@ class InputSource {
 
     [[nodiscard]] bool constant() const { return constant_; }
 
+    [[nodiscard]] Vec3 default_tangent_at(std::size_t lane) const {
+        return default_tangent(e_, e_.hit(lane));
+    }
+
     [[nodiscard]] Inputs& at(std::size_t lane, const Vec3& ns) {
         if (!constant_) {
             read_inputs(e_, op_, lane, ns, inputs_);
@@ -225,6 +246,16 @@ using SetupFunction = void (*)(const ScatterInputs&, const ClosureSetupContext&,
             return setup_refraction;
         case NodeOpCode::Translucent:
             return setup_translucent;
+        case NodeOpCode::Anisotropic:
+            return setup_anisotropic;
+        case NodeOpCode::Metallic:
+            return setup_metallic;
+        case NodeOpCode::Toon:
+            return setup_toon;
+        case NodeOpCode::Velvet:
+            return setup_velvet;
+        case NodeOpCode::Sheen:
+            return setup_sheen;
         default:
             return setup_transparent;
     }
@@ -289,9 +320,13 @@ class ClosureWriter {
 [[nodiscard]] Rgb add_scatter(InputSource<ScatterInputs>& source,
                               SetupFunction setup,
                               std::size_t lane,
-                              const ClosureSetupContext& ctx,
+                              ClosureSetupContext& ctx,
                               ClosureSink& sink) {
-    setup(source.at(lane, ctx.ns), ctx, sink);
+    const ScatterInputs& inputs = source.at(lane, ctx.ns);
+    if (inputs.anisotropy != 0.0f && is_zero(inputs.tangent)) {
+        ctx.tangent = source.default_tangent_at(lane);
+    }
+    setup(inputs, ctx, sink);
     return Rgb(0.0f);
 }
 

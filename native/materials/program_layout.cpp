@@ -58,6 +58,7 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Bump, OpKind::Hit, "1111113*", 3},
     {NodeOpCode::Attribute, OpKind::Hit, "", 5},
     {NodeOpCode::InstanceAttribute, OpKind::Hit, "", 5},
+    {NodeOpCode::Tangent, OpKind::Hit, "", 3},
     {NodeOpCode::Diffuse, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glossy, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glass, OpKind::Closure, "33113*", 0},
@@ -68,6 +69,11 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Background, OpKind::Closure, "331", 0},
     {NodeOpCode::PrincipledV1, OpKind::Closure, "331311111111111113*3*3*", 0},
     {NodeOpCode::PrincipledV2, OpKind::Closure, "3311111131111113113311113*3*3*", 0},
+    {NodeOpCode::Anisotropic, OpKind::Closure, "331113*3*", 0},
+    {NodeOpCode::Metallic, OpKind::Closure, "3331113*3*", 0},
+    {NodeOpCode::Toon, OpKind::Closure, "33113*", 0},
+    {NodeOpCode::Velvet, OpKind::Closure, "3313*", 0},
+    {NodeOpCode::Sheen, OpKind::Closure, "3313*", 0},
 };
 
 [[nodiscard]] bool below(std::uint16_t mode, std::uint16_t flags, std::size_t count) {
@@ -142,6 +148,14 @@ constexpr OpLayout kLayouts[] = {
             return op.mode <= 10;
         case NodeOpCode::VectorRotate:
             return below(op.mode, kInvertBit, 5);
+        case NodeOpCode::Tangent:
+            return op.mode < 3 ||
+                   ((op.mode & 3) == 3 && std::size_t{op.mode} >> 2 <= program.names.size());
+        case NodeOpCode::Toon:
+            return op.mode <= 1;
+        case NodeOpCode::Metallic:
+            return below(op.mode, kPhysicalBit, 5);
+        case NodeOpCode::Anisotropic:
         case NodeOpCode::Glossy:
         case NodeOpCode::Glass:
         case NodeOpCode::Refraction:

@@ -345,6 +345,28 @@ void run_normal_map(const Evaluation& e, const NodeOp& op) {
     }
 }
 
+void run_tangent(const Evaluation& e, const NodeOp& op) {
+    const int axis = op.mode & 3;
+    const std::uint16_t name = op.mode >> 2;
+    UvLookup lookup(e, name == 0 ? nullptr : &e.material.program.names[name - 1u]);
+    for (std::size_t i = 0; i < e.lanes; ++i) {
+        const SurfaceInteraction& hit = e.hit(i);
+        Vec3 around(0.0f);
+        if (axis < 3) {
+            // Across the axis and the way out from it, through the middle of the object's box.
+            const Vec3 out = generated_coordinate(e, hit) - Vec3(0.5f);
+            around = axis == 0   ? Vec3(0.0f, -out.z, out.y)
+                     : axis == 1 ? Vec3(-out.z, 0.0f, out.x)
+                                 : Vec3(-out.y, out.x, 0.0f);
+        } else {
+            around = uv_frame(e, hit, object_normal(e, hit), lookup).tangent;
+        }
+        const Vec3 side =
+            normalize_or(glm::cross(world_normal(e, hit, around), hit.ns), Vec3(0.0f));
+        e.store(op, i, glm::cross(hit.ns, side));
+    }
+}
+
 void run_object_info(const Evaluation& e, const NodeOp& op) {
     for (std::size_t i = 0; i < e.lanes; ++i) {
         const SurfaceInteraction& hit = e.hit(i);
@@ -388,7 +410,7 @@ void run_light_path(const Evaluation& e, const NodeOp& op) {
         const PathInfo path = e.paths.empty() ? PathInfo() : e.paths[e.hit_index(i)];
         switch (output) {
             case LightPathOutput::RayLength:
-                out[i] = e.hit(i).t;
+                out[i] = path.length_before + e.hit(i).t;
                 break;
             case LightPathOutput::RayDepth:
                 out[i] = static_cast<float>(path.depth);

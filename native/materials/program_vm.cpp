@@ -62,6 +62,7 @@ constexpr RunFunction kRun[] = {
     run_bump,
     run_attribute,
     run_instance_attribute,
+    run_tangent,
 };
 
 }  // namespace

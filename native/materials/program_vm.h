@@ -144,6 +144,7 @@ void run_magic(const Evaluation& e, const NodeOp& op);
 void run_brick(const Evaluation& e, const NodeOp& op);
 void run_bump(const Evaluation& e, const NodeOp& op);
 void run_attribute(const Evaluation& e, const NodeOp& op);
+void run_tangent(const Evaluation& e, const NodeOp& op);
 void run_instance_attribute(const Evaluation& e, const NodeOp& op);
 
 // Appends the scattering closures of every hit (index of out) and adds its emission.

@@ -260,6 +260,7 @@ void SceneBuild::find_needs() {
     needs.lamps_hittable = scene_->lights->has_hittable_lamps();
     needs.nee = !scene_->lights->empty();
     needs.textures = needs.environment && scene_->world.textured;
+    needs.light_path = needs.environment && scene_->world.asks_path;
     needs.all_constant = true;
     for (std::size_t i = 0; i < used.size(); ++i) {
         const Material& material = scene_->materials[i];
@@ -267,6 +268,7 @@ void SceneBuild::find_needs() {
             needs.emission = needs.emission || material.emits;
             needs.transparency = needs.transparency || material.transparent;
             needs.textures = needs.textures || material.textured;
+            needs.light_path = needs.light_path || material.asks_path;
             needs.all_constant = needs.all_constant && material.constant;
         }
     }

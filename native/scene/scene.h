@@ -27,6 +27,7 @@ struct SceneNeeds {
     bool constant_environment = false;
     bool transparency = false;  // some material lets shadow rays through
     bool textures = false;
+    bool light_path = false;    // some program asks how a path came
     bool all_constant = false;  // no material runs a node program
     bool nee = false;           // there is something to sample
 };

@@ -5,33 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from .. import compat
+from .nodes import flatten_light
 
 _TYPES = {"POINT": "Point", "SPOT": "Spot", "AREA": "Area", "SUN": "Sun"}
 
 
-def _linked_or_value(socket, fallback):
-    return fallback if socket is None or socket.is_linked else socket.default_value
-
-
-def node_factor(light, report) -> np.ndarray:
-    """What a lamp's node tree multiplies its strength with: a constant Emission."""
+def node_factor(native, images, light, report) -> np.ndarray:
+    """What a lamp's node tree multiplies its strength with."""
     if not light.use_nodes or light.node_tree is None:
         return np.ones(3)
-    output = light.node_tree.get_output_node("CYCLES")
-    links = output.inputs["Surface"].links if output is not None else ()
-    if not links:
-        return np.zeros(3)
-    node = links[0].from_node
-    if node.bl_idname != "ShaderNodeEmission":
-        report.warn(light.name, f"Node {node.name!r} of a light is not supported.")
-        return np.ones(3)
-    color, strength = node.inputs["Color"], node.inputs["Strength"]
-    for socket in (color, strength):
-        if socket.is_linked:
-            source = socket.links[0].from_node.name
-            report.warn(light.name, f"Node {source!r} of a light is not supported.")
-    color = np.array(_linked_or_value(color, (1.0, 1.0, 1.0, 1.0)), np.float64)[:3]
-    return color * _linked_or_value(strength, 1.0)
+    program = flatten_light(native, images, report, light).program
+    *factor, constant = native.mean_emission(program)
+    if not constant:
+        report.warn(light.name, "The light's nodes vary over it; their mean is used.")
+    return np.array(factor, np.float64)
 
 
 def _shape_fields(native, light) -> dict:
@@ -55,7 +42,7 @@ def _shape_fields(native, light) -> dict:
     return fields
 
 
-def light_fields(native, light, report) -> dict | None:
+def light_fields(native, images, light, report) -> dict | None:
     """Arguments of add_light but for name, place and visibility; None: emits nothing itself."""
     cycles = getattr(light, "cycles", None)
     if light.type == "AREA" and getattr(cycles, "is_portal", False):
@@ -63,7 +50,7 @@ def light_fields(native, light, report) -> dict | None:
         return None
     if light.type == "SPOT" and light.use_square:
         report.info(light.name, "Spot lights are round.")
-    strength = compat.light_strength(light) * node_factor(light, report)
+    strength = compat.light_strength(light) * node_factor(native, images, light, report)
     return {
         "type": getattr(native.LightType, _TYPES[light.type]),
         "strength": strength.tolist(),

@@ -66,7 +66,6 @@ _PRINCIPLED_V2 = (
 _NOT_YET = {
     "Subsurface": "subsurface scattering (diffuse instead)",
     "Subsurface Weight": "subsurface scattering (diffuse instead)",
-    "Anisotropy": "anisotropy",
     "Thin Film Thickness": "thin film",
 }
 
@@ -149,6 +148,35 @@ def _simple(code: str, table, with_distribution: bool = False):
     return handler
 
 
+def _glossy(f, node, scope, weight) -> None:
+    """Isotropic where nothing says otherwise: the cheaper closure."""
+    amount = f.input(node, scope, "Anisotropy", 1)
+    if amount.known == (0.0,):
+        _ROUND_GLOSSY(f, node, scope, weight)
+    else:
+        _ANISOTROPIC(f, node, scope, weight)
+
+
+def _metallic(f, node, scope, weight) -> None:
+    """By the colours of an edge-tinted metal, or by complex indices of refraction."""
+    _name_missing_features(f, node, scope)
+    physical = node.fresnel_type == "PHYSICAL_CONDUCTOR"
+    names = ("IOR", "Extinction") if physical else ("Base Color", "Edge Tint")
+    operands = _inputs(f, node, scope, [(name, 3) for name in names] + list(_ANISOTROPY))
+    mode = _distribution(f, node) | (f.native.PHYSICAL_BIT if physical else 0)
+    f.closure("Metallic", weight, operands, mode)
+
+
+def _toon(f, node, scope, weight) -> None:
+    operands = _inputs(f, node, scope, (_COLOR, ("Size", 1), ("Smooth", 1), _NORMAL))
+    f.closure("Toon", weight, operands, 1 if node.component == "GLOSSY" else 0)
+
+
+def _sheen(f, node, scope, weight) -> None:
+    code = "Velvet" if node.distribution == "ASHIKHMIN" else "Sheen"
+    f.closure(code, weight, _inputs(f, node, scope, (_COLOR, _ROUGHNESS, _NORMAL)))
+
+
 def _approximated(code: str, table, constants=()):
     """A node rendered as another closure, and said so."""
 
@@ -167,15 +195,17 @@ def _nothing(f, node, scope, weight) -> None:
 _COLOR = ("Color", 3)
 _ROUGHNESS = ("Roughness", 1)
 _NORMAL = ("Normal", 0)
-_GLOSSY = _simple("Glossy", (_COLOR, _ROUGHNESS, _NORMAL), with_distribution=True)
+_ANISOTROPY = (_ROUGHNESS, ("Anisotropy", 1), ("Rotation", 1), ("Tangent", 0), _NORMAL)
+_ROUND_GLOSSY = _simple("Glossy", (_COLOR, _ROUGHNESS, _NORMAL), with_distribution=True)
+_ANISOTROPIC = _simple("Anisotropic", (_COLOR, *_ANISOTROPY), with_distribution=True)
 
 CLOSURES = {
     "ShaderNodeBsdfPrincipled": _principled,
     "ShaderNodeMixShader": _mix,
     "ShaderNodeAddShader": _add,
     "ShaderNodeBsdfDiffuse": _simple("Diffuse", (_COLOR, _ROUGHNESS, _NORMAL)),
-    "ShaderNodeBsdfGlossy": _GLOSSY,
-    "ShaderNodeBsdfAnisotropic": _GLOSSY,
+    "ShaderNodeBsdfGlossy": _glossy,
+    "ShaderNodeBsdfAnisotropic": _glossy,
     "ShaderNodeBsdfGlass": _simple(
         "Glass", (_COLOR, _ROUGHNESS, ("IOR", 1), _NORMAL), with_distribution=True
     ),
@@ -187,9 +217,11 @@ CLOSURES = {
     "ShaderNodeEmission": _simple("Emission", (_COLOR, ("Strength", 1))),
     "ShaderNodeBackground": _simple("Background", (_COLOR, ("Strength", 1))),
     "ShaderNodeSubsurfaceScattering": _approximated("Diffuse", (_COLOR,), (0.0,)),
-    "ShaderNodeBsdfVelvet": _approximated("Diffuse", (_COLOR,), (0.0,)),
-    "ShaderNodeBsdfSheen": _approximated("Diffuse", (_COLOR,), (0.0,)),
-    "ShaderNodeBsdfToon": _approximated("Diffuse", (_COLOR,), (0.0,)),
-    "ShaderNodeBsdfMetallic": _approximated("Glossy", (("Base Color", 3), _ROUGHNESS)),
+    "ShaderNodeBsdfVelvet": _simple("Velvet", (_COLOR, ("Sigma", 1), _NORMAL)),
+    "ShaderNodeBsdfSheen": _sheen,
+    "ShaderNodeBsdfToon": _toon,
+    "ShaderNodeBsdfMetallic": _metallic,
+    "ShaderNodeBsdfHair": _approximated("Glossy", (_COLOR, ("RoughnessU", 1))),
+    "ShaderNodeBsdfHairPrincipled": _approximated("Glossy", (_COLOR, _ROUGHNESS)),
     "ShaderNodeHoldout": _nothing,
 }

@@ -65,6 +65,17 @@ def _geometry(f, node, scope, socket):
     return f.program.op("Geometry", [], size, mode)
 
 
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+
+
+def _tangent(f, node, scope, socket):
+    if node.direction_type == "RADIAL":
+        return f.program.op("Tangent", [], 3, _AXES[node.axis])
+    f.program.reads_uv = True
+    name = f.program.name_of(node.uv_map) + 1 if node.uv_map else 0
+    return f.program.op("Tangent", [], 3, 3 + 4 * name)
+
+
 def _named_output(code: str, enumeration: str, sizes: dict):
     """A node whose outputs are the modes of one operation."""
 
@@ -76,15 +87,6 @@ def _named_output(code: str, enumeration: str, sizes: dict):
         return f.program.op(code, [], sizes.get(name, 1), modes[name])
 
     return handler
-
-
-_light_path_output = _named_output("LightPath", "LightPathOutput", {})
-
-
-def _light_path(f, node, scope, socket):
-    """The renderer does not tell programs how a path came: every hit is a camera ray's."""
-    f.unsupported(node, "telling kinds of rays apart (all count as camera rays)")
-    return _light_path_output(f, node, scope, socket)
 
 
 def _object_info(f, node, scope, socket):
@@ -151,7 +153,8 @@ COORDINATES = {
     "ShaderNodeNewGeometry": _geometry,
     "ShaderNodeObjectInfo": _object_info,
     "ShaderNodeCameraData": _named_output("CameraData", "CameraDataOutput", {"ViewVector": 3}),
-    "ShaderNodeLightPath": _light_path,
+    "ShaderNodeLightPath": _named_output("LightPath", "LightPathOutput", {}),
     "ShaderNodeAttribute": _attribute,
+    "ShaderNodeTangent": _tangent,
     "ShaderNodeVertexColor": _color_attribute,
 }

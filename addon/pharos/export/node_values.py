@@ -290,10 +290,36 @@ def displaced_height(f, source):
 
 
 def _occlusion(f, node, scope, socket):
+    """As if nothing were near."""
     f.unsupported(node)
     if socket.identifier == "Color":
         return f.input(node, scope, "Color", 3)
     return f.program.constant(1.0)
+
+
+def _bevel(f, node, scope, socket):
+    """Edges stay sharp."""
+    f.unsupported(node)
+    normal = f.normal(node, scope)
+    return surface_normal(f) if normal == f.program.default_normal else normal
+
+
+def _absent(*values: float):
+    """A node of what is never there: reported, with the values of nothing."""
+
+    def handler(f, node, scope, socket):
+        f.unsupported(node)
+        vector = socket.type in {"RGBA", "VECTOR"}
+        return f.program.constant(*(values or (0.0,)) * (3 if vector else 1))
+
+    return handler
+
+
+def _light_falloff(f, node, scope, socket):
+    """Light falls off with the square of the distance, as it does by itself."""
+    if socket.identifier != "Quadratic":
+        f.unsupported(node, f"output {socket.name!r}")
+    return f.input(node, scope, "Strength", 1)
 
 
 VALUES = {
@@ -340,4 +366,11 @@ VALUES = {
     "ShaderNodeNormalMap": _normal_map,
     "ShaderNodeBump": _bump,
     "ShaderNodeAmbientOcclusion": _occlusion,
+    "ShaderNodeBevel": _bevel,
+    "ShaderNodeWireframe": _absent(),
+    "ShaderNodeHairInfo": _absent(),
+    "ShaderNodeParticleInfo": _absent(),
+    "ShaderNodePointInfo": _absent(),
+    "ShaderNodeVolumeInfo": _absent(),
+    "ShaderNodeLightFalloff": _light_falloff,
 }

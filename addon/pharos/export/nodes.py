@@ -146,12 +146,18 @@ class Flattener:
         output = tree.get_output_node("CYCLES")
         if output is not None:
             scope = Scope(tree)
+            self._name_outputs(tree)
             if self.linked(output, scope, "Volume"):
                 self.warn("Volume is not supported.")
             if self.linked(output, scope, "Displacement"):
                 self._displace(resolve(input_by_identifier(output, "Displacement"), scope))
             self.shader(output, scope, surface, self.program.constant(1.0))
         return self.result()
+
+    def _name_outputs(self, tree) -> None:
+        for node in tree.nodes:
+            if node.bl_idname == "ShaderNodeOutputAOV" and not node.mute:
+                self.unsupported(node)
 
     def _displace(self, source: Source) -> None:
         """Displacement tilts the normal that all closures start from."""
@@ -196,6 +202,10 @@ def flatten_material(native, images, report, material) -> Flattened:
         ],
     )
     return flattener.result()
+
+
+def flatten_light(native, images, report, light) -> Flattened:
+    return Flattener(native, images, report, light.name).flatten(light.node_tree)
 
 
 def flatten_world(native, images, report, world) -> Flattened:

@@ -36,6 +36,7 @@ class ProgramBuilder:
         self._memo: dict[tuple, Value] = {}
         self.step = (0.0, 0.0)  # where operations look that say where a hit is (bump mapping)
         self.mesh_attributes: set[str] = set()
+        self.reads_uv = False  # beside the operations that always do
         self.instance_attributes: set[str] = set()
         self.default_normal = Value(native.DEFAULT_OPERAND, 3)
 
@@ -154,7 +155,9 @@ class ProgramBuilder:
         wanted = {codes["Uv"], codes["NormalMap"]}
         coordinate = (codes["Coordinate"], self._native.CoordinateOutput["Uv"])
         tangent = (codes["Geometry"], self._native.GeometryOutput["Tangent"])
-        return any(op[0] in wanted or op[:2] in {coordinate, tangent} for op in self._ops)
+        return self.reads_uv or any(
+            op[0] in wanted or op[:2] in {coordinate, tangent} for op in self._ops
+        )
 
     def build(self):
         program = self._native.NodeProgram(

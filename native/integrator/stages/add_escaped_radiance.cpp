@@ -1,5 +1,6 @@
 #include "core/color.h"
 #include "integrator/mis.h"
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 
 namespace pharos {
@@ -17,11 +18,12 @@ void add_world(const RenderContext& context, PathBatch& batch) {
         for (const std::uint32_t i : batch.escaped) {
             batch.escaped_directions.push_back(batch.rays[i].direction);
         }
-        evaluate_world(scene.world,
-                       scene.shading,
-                       batch.escaped_directions,
-                       batch.scratch,
-                       batch.escaped_radiance);
+        const ShadingContext shading =
+            shading_with_paths(scene, count, batch.path_infos, [&](std::size_t k) {
+                return world_path_info(batch.counters[batch.active[batch.escaped[k]]]);
+            });
+        evaluate_world(
+            scene.world, shading, batch.escaped_directions, batch.scratch, batch.escaped_radiance);
     }
     const bool sampled = scene.environment != nullptr && !scene.lights->empty();
     for (std::size_t k = 0; k < count; ++k) {

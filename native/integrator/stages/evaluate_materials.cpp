@@ -1,5 +1,6 @@
 #include <numeric>
 
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 #include "integrator/surface_alpha.h"
 
@@ -106,12 +107,16 @@ std::uint64_t evaluate_materials(const RenderContext& context, PathBatch& batch)
     }
     group_by_material(context, batch);
     batch.closures.reset(batch.surfaces.size());
+    const ShadingContext shading =
+        shading_with_paths(scene, batch.surfaces.size(), batch.path_infos, [&](std::size_t s) {
+            return path_info(batch.counters[batch.surface_path[s]]);
+        });
     std::uint32_t begin = 0;
     for (std::size_t m = 0; m < scene.materials.size(); ++m) {
         const std::uint32_t end = batch.material_count[m];  // after the sort: one past the group
         if (end > begin) {
             evaluate_surfaces(scene.materials[m],
-                              scene.shading,
+                              shading,
                               batch.surfaces,
                               std::span(batch.material_order).subspan(begin, end - begin),
                               batch.scratch,

@@ -1,5 +1,6 @@
 #include "geometry/ray_offset.h"
 #include "integrator/mis.h"
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 #include "sampling/sampler.h"
 
@@ -100,6 +101,10 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
     batch.shadow_queries.push_back(ray);
 }
 
+[[nodiscard]] PathInfo asking_path(const PathBatch& batch, const PendingLight& pending) {
+    return light_path_info(batch.counters[batch.shadow_rays[pending.shadow].path], false);
+}
+
 // Radiance of the sampled emissive triangles, by material.
 void evaluate_pending_triangles(const RenderContext& context, PathBatch& batch) {
     const Scene& scene = context.scene;
@@ -113,8 +118,12 @@ void evaluate_pending_triangles(const RenderContext& context, PathBatch& batch) 
             batch.pending_surfaces.push_back(pending[end].emitter);
         }
         batch.pending_radiance.resize(end - begin);
+        const ShadingContext shading =
+            shading_with_paths(scene, end - begin, batch.path_infos, [&](std::size_t i) {
+                return asking_path(batch, pending[begin + i]);
+            });
         evaluate_emission(scene.materials[material],
-                          scene.shading,
+                          shading,
                           batch.pending_surfaces,
                           batch.scratch,
                           batch.pending_radiance);
@@ -132,11 +141,12 @@ void evaluate_pending_worlds(const RenderContext& context, PathBatch& batch) {
         batch.pending_directions.push_back(pending.direction);
     }
     batch.pending_radiance.resize(batch.pending_directions.size());
-    evaluate_world(scene.world,
-                   scene.shading,
-                   batch.pending_directions,
-                   batch.scratch,
-                   batch.pending_radiance);
+    const ShadingContext shading = shading_with_paths(
+        scene, batch.pending_worlds.size(), batch.path_infos, [&](std::size_t i) {
+            return asking_path(batch, batch.pending_worlds[i]);
+        });
+    evaluate_world(
+        scene.world, shading, batch.pending_directions, batch.scratch, batch.pending_radiance);
     for (std::size_t i = 0; i < batch.pending_worlds.size(); ++i) {
         batch.shadow_rays[batch.pending_worlds[i].shadow].contribution *= batch.pending_radiance[i];
     }

@@ -3,6 +3,7 @@
 #include "core/color.h"
 #include "geometry/ray_offset.h"
 #include "guiding/roulette.h"
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 #include "sampling/sampler.h"
 
@@ -36,6 +37,8 @@ constexpr std::uint32_t kGuideSet = 0x10000u;  // sampler sets of the guide's ch
 void count_bounce(const RenderSettings& settings, std::uint8_t lobe, PathCounters& counters) {
     ++counters.bounce;
     counters.from_camera = false;
+    counters.ray_kind = ray_kind_after(lobe);
+    counters.straight_length = 0.0f;
     bool limit = counters.bounce > settings.max_bounces;
     if (lobe & kLobeTransmission) {
         limit |= ++counters.transmission > settings.transmission_bounces;
@@ -61,6 +64,7 @@ void continue_path(const RenderContext& context,
         if (++counters.transparent > context.settings().transparent_bounces) {
             return;
         }
+        counters.straight_length += surface.t;
     } else {
         count_bounce(context.settings(), sample.lobe, counters);
         batch.scatter_pdf[path] = sample.lobe & kLobeDelta ? 0.0f : sample.pdf;

@@ -1,6 +1,7 @@
 #include "core/color.h"
 #include "geometry/ray_offset.h"
 #include "integrator/mis.h"
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 
 namespace pharos {
@@ -32,6 +33,8 @@ void trace_opaque(const RenderContext& context, PathBatch& batch) {
 // and the ray goes on behind it; opaque surfaces end it. Rays that leave add what they carry.
 void pass_one_surface(const RenderContext& context, PathBatch& batch) {
     const Scene& scene = context.scene;
+    const ShadingContext shading =
+        shading_with_paths(scene, 1, batch.path_infos, [](std::size_t) { return PathInfo(); });
     std::size_t kept = 0;
     for (std::size_t i = 0; i < batch.shadow_rays.size(); ++i) {
         const Hit& hit = batch.hits[i];
@@ -46,11 +49,11 @@ void pass_one_surface(const RenderContext& context, PathBatch& batch) {
             continue;
         }
         Rgb transmittance(0.0f);
-        evaluate_transparency(material,
-                              scene.shading,
-                              std::span(&surface, 1),
-                              batch.scratch,
-                              std::span(&transmittance, 1));
+        if (scene.needs.light_path) {
+            batch.path_infos[0] = light_path_info(batch.counters[batch.shadow_rays[i].path], true);
+        }
+        evaluate_transparency(
+            material, shading, std::span(&surface, 1), batch.scratch, std::span(&transmittance, 1));
         ShadowRay shadow = batch.shadow_rays[i];
         shadow.contribution *= transmittance;
         if (is_zero(shadow.contribution)) {

@@ -148,6 +148,26 @@ inline std::vector<LobeCase> lobe_cases() {
         {"glass multi", node(setup_glass, Distribution::MultiGgx)},
         {"refraction", node(setup_refraction, Distribution::Ggx)},
     };
+    const auto special = [](Node setup, Distribution distribution, bool flag) {
+        return [setup, distribution, flag](Random& r, float roughness_min) -> SurfaceSetup {
+            ScatterInputs in = random_scatter(r, roughness_min, distribution);
+            in.anisotropy = r.uniform(-0.6f, 0.6f);
+            in.rotation = r.uniform();
+            in.edge = r.uniform3() * (flag ? 4.0f : 1.0f);
+            in.smooth = r.uniform();
+            in.physical = in.glossy = flag;
+            return [in, setup](const ClosureSetupContext& ctx, ClosureSink& sink) {
+                setup(in, ctx, sink);
+            };
+        };
+    };
+    cases.push_back({"anisotropic", special(setup_anisotropic, Distribution::Ggx, false)});
+    cases.push_back({"metallic", special(setup_metallic, Distribution::Ggx, false)});
+    cases.push_back({"conductor", special(setup_metallic, Distribution::MultiGgx, true)});
+    cases.push_back({"toon diffuse", special(setup_toon, Distribution::Ggx, false)});
+    cases.push_back({"toon glossy", special(setup_toon, Distribution::Ggx, true)});
+    cases.push_back({"velvet", special(setup_velvet, Distribution::Ggx, false)});
+    cases.push_back({"sheen", special(setup_sheen, Distribution::Ggx, false)});
     cases.push_back({"principled v1", [](Random& r, float roughness_min) -> SurfaceSetup {
                          const PrincipledV1Inputs in = random_principled_v1(r, roughness_min);
                          return [in](const ClosureSetupContext& ctx, ClosureSink& sink) {
