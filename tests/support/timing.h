@@ -39,9 +39,10 @@ class Stopwatch {
     double cpu_ = cpu_now();
 };
 
-// The least of the times `attempt` returns; no further attempt once the bar is kept.
+// The least of what the attempts return, times or shares of time; none follows once the bar is
+// kept.
 template <class Attempt>
-[[nodiscard]] double best_seconds(double bar, Attempt&& attempt) {
+[[nodiscard]] double least_of(double bar, Attempt&& attempt) {
     double best = attempt();
     for (int i = 1; i < kTimedAttempts && best >= bar; ++i) {
         best = std::min(best, attempt());
