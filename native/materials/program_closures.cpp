@@ -145,7 +145,9 @@ void read_inputs(const Evaluation& e,
 }
 
 [[nodiscard]] Rgb finite_or_black(const Rgb& c) {
-    return is_finite(c) ? c : Rgb(0.0f);
+    return Rgb(std::isfinite(c.x) ? c.x : 0.0f,
+               std::isfinite(c.y) ? c.y : 0.0f,
+               std::isfinite(c.z) ? c.z : 0.0f);
 }
 
 [[nodiscard]] ClosureSetupContext context_of(const Evaluation& e, const SurfaceInteraction& hit) {

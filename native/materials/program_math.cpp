@@ -269,14 +269,16 @@ struct RangeMap {
     [[nodiscard]] float operator()(float x) const {
         float factor = safe_divide(x - from_min, from_max - from_min);
         if (mode == MapRangeMode::Stepped) {
-            factor = safe_divide(std::floor(factor * (steps + 1.0f)), steps);
+            factor = steps > 0.0f ? std::floor(factor * (steps + 1.0f)) / steps : 0.0f;
         } else if (mode != MapRangeMode::Linear) {
             factor = ease(mode, saturate(factor));
         }
-        const float result = to_min + factor * (to_max - to_min);
-        return clamp ? std::fmin(std::fmax(result, std::fmin(to_min, to_max)),
-                                 std::fmax(to_min, to_max))
-                     : result;
+        return clamped(to_min + factor * (to_max - to_min));
+    }
+
+    [[nodiscard]] float clamped(float x) const {
+        const float lower = std::fmin(to_min, to_max);
+        return clamp ? std::fmin(std::fmax(x, lower), std::fmax(to_min, to_max)) : x;
     }
 };
 
@@ -406,7 +408,7 @@ void run_map_range(const Evaluation& e, const NodeOp& op) {
                            mode,
                            clamp};
         // An empty source range gives zero here, and the target's minimum for vectors.
-        out[i] = map.from_min != map.from_max ? map(in[0].scalar(i)) : 0.0f;
+        out[i] = map.from_min != map.from_max ? map(in[0].scalar(i)) : map.clamped(0.0f);
     }
 }
 
