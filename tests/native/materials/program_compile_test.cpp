@@ -324,14 +324,15 @@ TEST(ProgramCompile, TexturedEmissionIsEstimatedByTheMean) {
     EXPECT_NEAR(material.emission_estimate.x, 6.0f, 1e-5f);
 }
 
+// Channel by channel, as Cycles drops what is no number.
 TEST(ProgramCompile, BrokenEmissionIsBlack) {
     ProgramBuilder b;
     b.show(b.geometry(GeometryOutput::Position));
     SurfaceInteraction hit;
     hit.p = Vec3(1, NAN, 2);
-    EXPECT_EQ(emission_of(compile(b.program), {&hit, 1})[0], Rgb(0.0f));
+    EXPECT_EQ(emission_of(compile(b.program), {&hit, 1})[0], Rgb(1, 0, 2));
     hit.p = Vec3(1, INFINITY, 2);
-    EXPECT_EQ(emission_of(compile(b.program), {&hit, 1})[0], Rgb(0.0f));
+    EXPECT_EQ(emission_of(compile(b.program), {&hit, 1})[0], Rgb(1, 0, 2));
 }
 
 TEST(ProgramCompile, TransparencyIsTheSumOfItsClosures) {
