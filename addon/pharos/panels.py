@@ -222,7 +222,14 @@ class PHAROS_VIEW_LAYER_PT_passes(_PharosPanel, bpy.types.Panel):
             ),
         ),
         ("Indexes", (("use_pass_object_index", "Object"), ("use_pass_material_index", "Material"))),
-        ("Light", (("use_pass_emit", "Emission"), ("use_pass_environment", "Environment"))),
+        *(
+            (
+                lobe,
+                tuple((f"use_pass_{lobe}_{p}".lower(), p) for p in ("Direct", "Indirect", "Color")),
+            )
+            for lobe in ("Diffuse", "Glossy", "Transmission")
+        ),
+        ("Other", (("use_pass_emit", "Emission"), ("use_pass_environment", "Environment"))),
     )
 
     def draw(self, context):

@@ -28,6 +28,20 @@ class Pass(NamedTuple):
         return not self.switch.startswith("pharos.")
 
 
+def _light_passes():
+    """Light by the lobes of the first hit, under Cycles' names."""
+    for lobe, short in (("Diffuse", "Diff"), ("Glossy", "Gloss"), ("Transmission", "Trans")):
+        for part in ("Direct", "Indirect", "Color"):
+            yield Pass(
+                f"{lobe}{part}",
+                f"{lobe} {part}",
+                "RGB",
+                "COLOR",
+                f"use_pass_{lobe}_{part}".lower(),
+                short + part[:3],
+            )
+
+
 PASSES = (
     Pass("Combined", "Combined", "RGBA", "COLOR"),
     Pass("Depth", "Depth", "Z", "VALUE", "use_pass_z"),
@@ -39,6 +53,7 @@ PASSES = (
     Pass("MaterialIndex", "Material Index", "X", "VALUE", "use_pass_material_index", "IndexMA"),
     Pass("Emission", "Emission", "RGB", "COLOR", "use_pass_emit", "Emit"),
     Pass("Environment", "Environment", "RGB", "COLOR", "use_pass_environment", "Env"),
+    *_light_passes(),
     Pass("DenoisingNormal", "Denoising Normal", "XYZ", "VECTOR", "pharos.use_pass_denoising"),
     Pass("DenoisingAlbedo", "Denoising Albedo", "RGB", "COLOR", "pharos.use_pass_denoising"),
     Pass("SampleCount", "Debug Sample Count", "X", "VALUE", "pharos.use_pass_sample_count"),
@@ -59,8 +74,7 @@ _UNSUPPORTED = {
     "use_pass_shadow": "Shadow",
     "use_pass_ambient_occlusion": "Ambient Occlusion",
     **{
-        f"use_pass_{lobe}_{part}": f"{lobe.capitalize()} {part.capitalize()}"
-        for lobe in ("diffuse", "glossy", "transmission", "subsurface")
+        f"use_pass_subsurface_{part}": f"Subsurface {part.capitalize()}"
         for part in ("direct", "indirect", "color")
     },
     **{

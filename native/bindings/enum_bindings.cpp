@@ -141,7 +141,16 @@ void bind_passes(py::module_& m) {
                            {"GuideDirection", FilmPass::GuideDirection},
                            {"GuideKappa", FilmPass::GuideKappa},
                            {"GuideIrradiance", FilmPass::GuideIrradiance},
-                           {"GuideShare", FilmPass::GuideShare}});
+                           {"GuideShare", FilmPass::GuideShare},
+                           {"DiffuseDirect", FilmPass::DiffuseDirect},
+                           {"DiffuseIndirect", FilmPass::DiffuseIndirect},
+                           {"DiffuseColor", FilmPass::DiffuseColor},
+                           {"GlossyDirect", FilmPass::GlossyDirect},
+                           {"GlossyIndirect", FilmPass::GlossyIndirect},
+                           {"GlossyColor", FilmPass::GlossyColor},
+                           {"TransmissionDirect", FilmPass::TransmissionDirect},
+                           {"TransmissionIndirect", FilmPass::TransmissionIndirect},
+                           {"TransmissionColor", FilmPass::TransmissionColor}});
     m.def("film_pass_channels", &film_pass_channels, FloatGuard(), py::arg("film_pass"));
     m.def("pass_bit", &pass_bit, FloatGuard(), py::arg("film_pass"));
 }

@@ -64,14 +64,24 @@ void Film::read_on_request(FilmPass pass, std::span<float> out) const {
     CHECK(passes_.wants(pass));
     const auto channels = static_cast<std::size_t>(film_pass_channels(pass));
     const FilmPassInfo& info = film_pass_info(pass);
+    const FilmPass divisor = color_of(pass);
     for (std::size_t i = 0; i < weight_.size(); ++i) {
         const double* block = &blocks_[i * passes_.size() + passes_.offset(pass)];
         double scale = info.exposed ? static_cast<double>(exposure_) : 1.0;
         if (info.kind == PassKind::Average) {
             scale *= weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
         }
+        const double* color = divisor == FilmPass::Count
+                                  ? nullptr
+                                  : &blocks_[i * passes_.size() + passes_.offset(divisor)];
+        if (color != nullptr) {
+            scale = static_cast<double>(exposure_);  // both are sums of the same weights
+        }
         for (std::size_t c = 0; c < channels; ++c) {
-            out[i * channels + c] = static_cast<float>(block[c] * scale);
+            const double value = color == nullptr ? block[c]
+                                 : color[c] > 0.0 ? block[c] / color[c]
+                                                  : 0.0;
+            out[i * channels + c] = static_cast<float>(value * scale);
         }
         if (pass == FilmPass::Mist) {
             // Paths write how clearly the surface shows.

@@ -26,6 +26,15 @@ constexpr std::array<FilmPassInfo, kFilmPasses> kInfos{{
     {"Guide Kappa", "X", PassKind::AtTheEnd, false},
     {"Guide Irradiance", "X", PassKind::AtTheEnd, false},
     {"Guide Share", "X", PassKind::AtTheEnd, false},
+    {"Diffuse Direct", "RGB", PassKind::Average, true},
+    {"Diffuse Indirect", "RGB", PassKind::Average, true},
+    {"Diffuse Color", "RGB", PassKind::Average, false},
+    {"Glossy Direct", "RGB", PassKind::Average, true},
+    {"Glossy Indirect", "RGB", PassKind::Average, true},
+    {"Glossy Color", "RGB", PassKind::Average, false},
+    {"Transmission Direct", "RGB", PassKind::Average, true},
+    {"Transmission Indirect", "RGB", PassKind::Average, true},
+    {"Transmission Color", "RGB", PassKind::Average, false},
 }};
 
 }  // namespace
@@ -41,6 +50,12 @@ int film_pass_channels(FilmPass pass) {
 }
 
 PassLayout::PassLayout(std::uint32_t wanted) {
+    for (std::size_t i = 0; i < kFilmPasses; ++i) {
+        const auto pass = static_cast<FilmPass>(i);
+        if ((wanted & pass_bit(pass)) != 0 && color_of(pass) != FilmPass::Count) {
+            wanted |= pass_bit(color_of(pass));
+        }
+    }
     for (const bool at_the_end : {false, true}) {
         for (std::size_t i = 0; i < kFilmPasses; ++i) {
             const auto pass = static_cast<FilmPass>(i);

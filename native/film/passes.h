@@ -32,6 +32,17 @@ enum class FilmPass : std::uint8_t {
     GuideKappa,       // concentration of a single lobe with the same mean
     GuideIrradiance,  // A
     GuideShare,       // of the sampling that follows the guide; the rest follows the material
+    // light by the lobes of the first hit, without their colours: (direct + indirect) * colour
+    // over the three, with Emission and Environment, is Combined
+    DiffuseDirect,
+    DiffuseIndirect,
+    DiffuseColor,
+    GlossyDirect,
+    GlossyIndirect,
+    GlossyColor,
+    TransmissionDirect,
+    TransmissionIndirect,
+    TransmissionColor,
     Count
 };
 
@@ -62,9 +73,33 @@ inline constexpr std::uint32_t kGuidePasses =
     pass_bit(FilmPass::GuideDirection) | pass_bit(FilmPass::GuideKappa) |
     pass_bit(FilmPass::GuideIrradiance) | pass_bit(FilmPass::GuideShare);
 
+// The pass of colours that a pass of light is divided by; Count for any other.
+[[nodiscard]] constexpr FilmPass color_of(FilmPass pass) {
+    switch (pass) {
+        case FilmPass::DiffuseDirect:
+        case FilmPass::DiffuseIndirect:
+            return FilmPass::DiffuseColor;
+        case FilmPass::GlossyDirect:
+        case FilmPass::GlossyIndirect:
+            return FilmPass::GlossyColor;
+        case FilmPass::TransmissionDirect:
+        case FilmPass::TransmissionIndirect:
+            return FilmPass::TransmissionColor;
+        default:
+            return FilmPass::Count;
+    }
+}
+
+inline constexpr std::uint32_t kLightPasses =
+    pass_bit(FilmPass::DiffuseDirect) | pass_bit(FilmPass::DiffuseIndirect) |
+    pass_bit(FilmPass::DiffuseColor) | pass_bit(FilmPass::GlossyDirect) |
+    pass_bit(FilmPass::GlossyIndirect) | pass_bit(FilmPass::GlossyColor) |
+    pass_bit(FilmPass::TransmissionDirect) | pass_bit(FilmPass::TransmissionIndirect) |
+    pass_bit(FilmPass::TransmissionColor);
+
 class PassLayout {
   public:
-    // Bits of unknown and of basic passes are ignored.
+    // Bits of unknown and of basic passes are ignored; light brings its colour along.
     explicit PassLayout(std::uint32_t wanted = 0);
 
     [[nodiscard]] bool wants(FilmPass pass) const { return (wanted_ & pass_bit(pass)) != 0; }

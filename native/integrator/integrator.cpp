@@ -76,6 +76,8 @@ void Integrator::render_batch(const RenderContext& context,
 void Integrator::follow_paths(const RenderContext& context, Worker& worker) const {
     PathBatch& batch = worker.batch;
     BatchStatistics& statistics = worker.statistics;
+    LightSplit& split = worker.split;
+    split.begin(context, batch);
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
         timed(
@@ -92,7 +94,10 @@ void Integrator::follow_paths(const RenderContext& context, Worker& worker) cons
         timed(statistics, Stage::AddEmittedRadiance, [&] {
             return add_emitted_radiance(context, batch);
         });
-        timed(statistics, Stage::WritePasses, [&] { return write_passes(context, batch); });
+        timed(statistics, Stage::WritePasses, [&] {
+            split.take_hits(context, batch);
+            return write_passes(context, batch);
+        });
         timed(statistics, Stage::QueryGuidingField, [&] {
             return query_guiding_field(context, batch);
         });
@@ -100,10 +105,13 @@ void Integrator::follow_paths(const RenderContext& context, Worker& worker) cons
             return sample_direct_light(context, batch);
         });
         statistics.rays += batch.shadow_rays.size();
+        split.before_shadow_rays(context, batch);
         timed(
             statistics, Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
+        split.after_shadow_rays(context, batch);
         timed(
             statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
+        split.take_directions(context, batch);
     }
     timed(statistics, Stage::RecordRadiance, [&] {
         return record_radiance(context, batch, worker.records);

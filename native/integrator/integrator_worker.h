@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "integrator/integrator.h"
+#include "integrator/light_split.h"
 #include "integrator/path_batch.h"
 
 namespace pharos {
@@ -14,6 +15,7 @@ inline constexpr std::uint32_t kBatchPaths = 1024;
 
 struct Integrator::Worker {
     PathBatch batch{kBatchPaths};
+    LightSplit split;
     BatchStatistics statistics;
     RecordBuffer records;
 };

@@ -112,6 +112,63 @@ def test_transparent_film_and_mist_shapes():
     scene.pharos.follow_cycles = False
 
 
+def _corner(samples: int):
+    """Diffuse, glossy and glass before a lit wall, each visible on its own."""
+    scene = harness.new_scene(24, 12, samples)
+    harness.add_camera(location=(0, -5, 1.0), rotation=(1.4, 0.0, 0.0))
+    shaders = (
+        ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.5, 0.3, 1.0)}),
+        ("ShaderNodeBsdfGlossy", {"Color": (0.4, 0.7, 0.9, 1.0), "Roughness": 0.3}),
+        ("ShaderNodeBsdfRefraction", {"Color": (0.9, 0.9, 0.5, 1.0), "Roughness": 0.3, "IOR": 1.3}),
+    )
+    for place, (kind, inputs) in enumerate(shaders):
+        owner = harness.material(kind)
+        shader = harness.node(owner, kind, **inputs)
+        harness.connect(owner, shader.outputs[0], harness.surface(owner))
+        card = harness.add_object(harness.plane_mesh(kind, half=0.5), owner)
+        card.location, card.rotation_euler = (1.2 * place - 1.2, 0.0, 0.6), (1.2, 0.0, 0.0)
+    harness.add_object(
+        harness.plane_mesh("Back", half=3.0), bpy.data.materials["ShaderNodeBsdfDiffuse"]
+    ).location = (0.0, 1.0, -0.5)
+    light = bpy.data.lights.new("Lamp", "AREA")
+    light.energy = 60.0
+    harness.link(bpy.data.objects.new("Lamp", light)).location = (0.5, -1.0, 3.0)
+    harness.set_world((0.3, 0.4, 0.5))
+    _cycles(samples)
+    for name in ("max", "diffuse", "glossy", "transmission"):
+        setattr(scene.cycles, f"{name}_bounces", 3)
+    scene.cycles.light_sampling_threshold = 0.0
+    # Caustics would be noise here.
+    scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
+    return scene
+
+
+def test_light_by_lobes_is_that_of_cycles():
+    scene = _corner(1024)
+    layer = bpy.context.view_layer
+    switches = [
+        f"use_pass_{lobe}_{part}"
+        for lobe in ("diffuse", "glossy", "transmission")
+        for part in ("direct", "indirect", "color")
+    ]
+    for switch in switches:
+        setattr(layer, switch, True)
+    try:
+        theirs, ours = _both("light")
+    finally:
+        for switch in switches:
+            setattr(layer, switch, False)
+        scene.pharos.follow_cycles = False
+        scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = True
+    assert set(theirs) == set(ours) and len(ours) == 4 + 27, set(ours) ^ set(theirs)
+    for channel, expected in theirs.items():
+        indirect = "Ind" in channel
+        error = abs(ours[channel].mean() - expected.mean())
+        limit = (0.06 if indirect else 0.02) * expected.mean() + 5e-4
+        assert error < limit, (channel, ours[channel].mean(), expected.mean())
+        assert indirect or expected.mean() > 0.005, channel
+
+
 def test_passes_cost_nothing_unless_wanted():
     _still_life(1)
     out = harness.exported()
@@ -178,15 +235,15 @@ def test_unsupported_passes_are_named():
     harness.new_scene(8, 8, 1)
     harness.add_camera()
     layer = bpy.context.view_layer
-    layer.use_pass_diffuse_direct = layer.use_pass_vector = layer.use_pass_mist = True
+    layer.use_pass_subsurface_direct = layer.use_pass_vector = layer.use_pass_mist = True
     layer.aovs.add().name = "Mask"
     try:
         harness.render()
         named = [line.split(": ", 1)[1] for line in harness.report()]
     finally:
-        layer.use_pass_diffuse_direct = layer.use_pass_vector = layer.use_pass_mist = False
+        layer.use_pass_subsurface_direct = layer.use_pass_vector = layer.use_pass_mist = False
         bpy.ops.scene.view_layer_remove_aov()
-    names = ("Vector", "Diffuse Direct", "AOV Mask")
+    names = ("Vector", "Subsurface Direct", "AOV Mask")
     assert named == [f"Pass {name!r} is not supported." for name in names], named
     assert not layer.aovs
 

@@ -135,6 +135,56 @@ SceneDescription lit_room(GuidingMode guiding) {
     return d;
 }
 
+// Diffuse, glossy, rough and smooth glass, a pane, an emitter and the world, guided or not: what
+// the passes of light tell adds up to the picture.
+TEST(Passes, LightByLobesAddsUpToThePicture) {
+    for (const GuidingMode guiding : {GuidingMode::Off, GuidingMode::Slides}) {
+        SceneBuilder b;
+        b.description() = lit_room(guiding);
+        const auto object = [&](const char* name, const Vec3& at, NodeProgram program) {
+            b.object(sphere_mesh(name, at, 0.35f), b.material(name, std::move(program)));
+        };
+        object("gloss", Vec3(-0.8f, 0.2f, 0.4f), glossy_program(Rgb(0.8f, 0.6f, 0.4f), 0.2f));
+        object("glass", Vec3(0.0f, 0.0f, 0.5f), glass_program(Rgb(0.9f, 1.0f, 0.8f), 0.0f, 1.5f));
+        object("rough", Vec3(0.8f, 0.2f, 0.4f), glass_program(Rgb(1.0f), 0.3f, 1.4f));
+        object("lamp", Vec3(1.0f, 0.8f, 1.2f), emission_program(Rgb(1.0f, 0.8f, 0.5f), 2.0f));
+        const auto pane = b.material("pane", transparent_program(Rgb(0.8f)));
+        b.object(quad_mesh("pane", Vec3(-2, -1, 0), Vec3(2, 0, 0), Vec3(0, 0, 2)), pane);
+        SceneDescription d = b.build();
+        d.film.exposure = 1.5f;
+        d.passes.wanted = all_passes();
+        const RenderSession session(std::move(d), 2);
+        finish(session);
+        auto sum = read(session, FilmPass::Emission);
+        const auto environment = read(session, FilmPass::Environment);
+        for (std::size_t i = 0; i < sum.size(); ++i) {
+            sum[i] += environment[i];
+        }
+        bool seen[3] = {};
+        for (std::size_t lobe = 0; lobe < 3; ++lobe) {
+            const auto pass = [&](std::size_t part) {
+                return read(
+                    session,
+                    static_cast<FilmPass>(static_cast<std::size_t>(FilmPass::DiffuseDirect) +
+                                          3 * lobe + part));
+            };
+            const auto direct = pass(0);
+            const auto indirect = pass(1);
+            const auto color = pass(2);
+            for (std::size_t i = 0; i < sum.size(); ++i) {
+                sum[i] += (direct[i] + indirect[i]) * color[i];
+                seen[lobe] |= (direct[i] + indirect[i]) * color[i] > 0.01f;
+            }
+        }
+        EXPECT_TRUE(seen[0] && seen[1] && seen[2]);
+        const auto combined = read(session, FilmPass::Combined);
+        for (std::size_t i = 0; i < sum.size(); ++i) {
+            const float expected = combined[i / 3 * 4 + i % 3];
+            ASSERT_NEAR(sum[i], expected, 2e-4f * std::max(1.0f, expected)) << i;
+        }
+    }
+}
+
 TEST(Passes, GuideIsShownWhereItServes) {
     const RenderSession session(lit_room(GuidingMode::Slides), 2);
     finish(session);
