@@ -18,6 +18,8 @@ enum class LobeClass : std::uint8_t { Diffuse, Glossy };  // what is neither, tr
         case ClosureType::GgxRefraction:
         case ClosureType::GgxGlass:
         case ClosureType::Clearcoat:
+        case ClosureType::ToonGlossy:
+        case ClosureType::Velvet:
             return LobeClass::Glossy;
         default:
             return LobeClass::Diffuse;
