@@ -1,5 +1,5 @@
-"""Prints 'PASSED FAILED SKIPPED' of a ctest report, then a line for each failed test: its name and
-the beginning of what it said; for tests/run.
+"""Prints "PASSED FAILED SKIPPED" of reports by ctest or GoogleTest, then a line a failed test:
+its name and the beginning of what it said; for tests/run.
 """
 
 import re
@@ -23,23 +23,34 @@ def reason(case):
             break
     failure = case.find("failure")
     if failure is not None and not kept:
-        kept = [failure.get("message", ""), *said[-2:]]
+        kept = [*failure.get("message", "").splitlines()[: 1 + _LINES_AFTER], *said[-2:]]
     # Paths of the machine say nothing: the file's name does.
     return re.sub(r"(?:[\w.+-]*/)+(?=[\w.+-]+:\d)", "", " | ".join(kept))[:_LONGEST]
 
 
-def main(path):
-    counts = {"run": 0, "fail": 0, "notrun": 0, "disabled": 0}
+def title(case):
+    group = case.get("classname")
+    name = case.get("name")
+    return name if group in (None, name) else f"{group}.{name}"
+
+
+def main(paths):
+    passed, failed, skipped = 0, 0, 0
     failures = []
-    for case in ElementTree.parse(path).getroot().iter("testcase"):
-        status = case.get("status", "fail")
-        counts[status if status in counts else "fail"] += 1
-        if status not in ("run", "notrun", "disabled"):
-            failures.append(f"{case.get('name')}: {reason(case)}")
-    print(counts["run"], counts["fail"], counts["notrun"] + counts["disabled"])
+    for path in paths:
+        for case in ElementTree.parse(path).getroot().iter("testcase"):
+            status = case.get("status", "fail")
+            if case.find("failure") is not None or status not in ("run", "notrun", "disabled"):
+                failed += 1
+                failures.append(f"{title(case)}: {reason(case)}")
+            elif status == "run" and case.get("result") != "skipped":
+                passed += 1
+            else:
+                skipped += 1
+    print(passed, failed, skipped)
     for line in failures:
         print(line)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1:])

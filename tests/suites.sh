@@ -106,6 +106,36 @@ run_ctest() {
         "$LOGS/$name.log" | head -n 30
 }
 
+# run_programs NAME SECONDS PRESET MODULES...: the unit tests of some modules under a sanitizer, two
+# programs at a time. Not by ctest: a sanitized process takes seconds to start and to end.
+run_programs() {
+    local name=$1 seconds=$2 folder=$PHAROS_ROOT/build/$3/tests/native reports=$LOGS/$1 status read_report module
+    local log=$LOGS/$1.log telling='ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error|terminate called'
+    shift 3
+    rm -rf "$reports"
+    mkdir -p "$reports"
+    printf '%s_test\n' "$@" >"$reports/programs"
+    logged "$name" "$seconds" xargs -a "$reports/programs" -P 2 -I{} env "$folder/{}" --gtest_brief=1 \
+        "--gtest_filter=-$STATISTICAL" "--gtest_output=xml:$reports/{}.xml"
+    status=$?
+    for module in "$@"; do
+        if [ -f "$reports/${module}_test.xml" ]; then
+            read_report=$("$PYTHON" "$PHAROS_ROOT/tests/read_junit.py" "$reports/${module}_test.xml")
+            count $(head -n 1 <<<"$read_report")
+            blame_lines < <(tail -n +2 <<<"$read_report")
+        else
+            count 0 1
+            blame "${module}_test ended without a report (status $status)"
+        fi
+    done
+    # What a sanitizer says need not be a test's failure.
+    if [ "$status" != 0 ]; then
+        [ "$suite_failed" -gt 0 ] || count 0 1
+        blame_lines < <(grep -aE "$telling|^SUMMARY:" "$log" | sort -u | head -n 6)
+        grep -aE "$telling|Failure" -A 12 "$log" | head -n 80
+    fi
+}
+
 # build_or_fail PRESET TARGETS...: counts a failure where the build breaks.
 build_or_fail() {
     build_preset "$@" && return
@@ -146,23 +176,32 @@ suite_tidy() {
 }
 
 # Sanitized programs are several times slower: tests that count many random numbers take part only
-# in the plain build (their names say so), and the rest has a limit of its own.
-STATISTICAL='ChiSquare|chi_square|Statistic|Random.*Bound|Long'
+# in the plain build (their names say so).
+STATISTICAL='*ChiSquare*:*chi_square*:*Statistic*:*Random*Bound*:*Long*'
+
+# The modules that have unit tests, of those named.
+tested_modules() {
+    local module
+    for module in "$@"; do
+        ! compgen -G "$PHAROS_ROOT/tests/native/$module/*_test.cpp" >/dev/null || printf '%s\n' "$module"
+    done
+}
 
 suite_asan() {
+    local modules
+    mapfile -t modules < <(tested_modules session guiding materials lights scene geometry image core \
+        sampling camera film integrator)
     build_or_fail asan native_tests || return
     ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:fast_unwind_on_malloc=0:malloc_context_size=12 \
         LSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/leaks.txt:print_suppressions=0 \
         UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest asan 720 asan -E "$STATISTICAL"
+        run_programs asan 900 asan "${modules[@]}"
 }
 
 suite_tsan() {
-    local targets=() module
-    for module in core film integrator session; do
-        ! compgen -G "$PHAROS_ROOT/tests/native/$module/*_test.cpp" >/dev/null || targets+=("${module}_test")
-    done
-    build_or_fail tsan "${targets[@]}" || return
+    local modules
+    mapfile -t modules < <(tested_modules session core film)
+    build_or_fail tsan "${modules[@]/%/_test}" || return
     TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \
-        run_ctest tsan 480 tsan -R '^(core|film|integrator|session)\.' -E "$STATISTICAL"
+        run_programs tsan 600 tsan "${modules[@]}"
 }
