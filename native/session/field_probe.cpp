@@ -82,8 +82,9 @@ void draw_learned(FieldProbe& probe) {
         for (std::uint32_t x = 0; x < probe.width; ++x) {
             double sum = 0.0;
             for (std::uint32_t i = 0; i < kSubdivision * kSubdivision; ++i) {
+                const std::uint32_t row = y * kSubdivision + i / kSubdivision;
                 const auto u = static_cast<float>(x * kSubdivision + i % kSubdivision);
-                const auto v = static_cast<float>(y * kSubdivision + i / kSubdivision);
+                const auto v = static_cast<float>(row);
                 const Vec3 w = latlong_direction((u + 0.5f) / width, (v + 0.5f) / height);
                 sum += static_cast<double>(mixture_pdf(probe.mixture, w));
             }
@@ -111,8 +112,9 @@ void draw_truth(const Scene& scene,
         for (std::uint32_t i = 0; i < cells; ++i) {
             const Vec4 u =
                 sobol_4d(pixel_hash(scene.description.settings.seed, i, 1), sample, kJitterSet);
+            const std::uint32_t row = i / probe.width;
             const auto x = static_cast<float>(i % probe.width);
-            const auto y = static_cast<float>(i / probe.width);
+            const auto y = static_cast<float>(row);
             const Vec3 w = latlong_direction((x + u.x) / static_cast<float>(probe.width),
                                              (y + u.y) / static_cast<float>(probe.height));
             const float cos_i = glm::dot(surface.ns, w);
@@ -149,7 +151,8 @@ double latlong_divergence(std::span<const float> truth,
     double total[2] = {};
     double sphere = 0.0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
-        const double v = (static_cast<double>(i / width) + 0.5) / height;
+        const std::size_t row = i / width;
+        const double v = (static_cast<double>(row) + 0.5) / height;
         solid_angle[i] = std::sin(v * std::numbers::pi);
         total[0] += static_cast<double>(truth[i]) * solid_angle[i];
         total[1] += static_cast<double>(learned[i]) * solid_angle[i];
