@@ -17,6 +17,7 @@ struct VertexRecord {
     std::uint32_t path = 0;
     std::uint32_t vertex = 0;
     bool complete = false;   // a smooth direction was sampled
+    bool judged = false;     // the field was asked, so that selection can compare
     float nee_scale = 0.0f;  // pdf / mis_weight of the light sample
     float smooth_probability = 1.0f;
     Vec3 wi{0.0f};

@@ -150,6 +150,12 @@ void GuideController::learn(RecordBuffer records,
     ++pass_;
 }
 
+void GuideController::rest() {
+    if (enabled_ && selection_) {
+        status_.closed = selection_->update({}, {}).closed;
+    }
+}
+
 void GuideController::judge_hardness(double relative_variance, double moment_ratio) {
     if (pass_ == 1) {
         hard_ = relative_variance > kHardVariance;

@@ -33,6 +33,9 @@ class GuideController {
     // Takes what a pass recorded, with its counted work, and the picture so far.
     void learn(RecordBuffer records, const SelectionPass& work, const Film& film, ThreadPool& pool);
 
+    // Counts a pass taken while nothing is learned: the gate opens again, rarely, for a probe.
+    void rest();
+
     [[nodiscard]] const GuideStatus& status() const { return status_; }
 
   private:

@@ -188,6 +188,7 @@ void RenderSession::Impl::learn(GuideController& guide,
                                 const BatchStatistics& before,
                                 ThreadPool& pool) {
     if (!guide.learning()) {
+        guide.rest();
         return;
     }
     const BatchStatistics& after = integrator.statistics();

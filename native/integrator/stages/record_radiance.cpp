@@ -34,7 +34,7 @@ void finish_record(const RenderContext& context,
                                std::max(luminance(L), 0.0f) * cos_i,
                                record.selection.pdf_used / record.smooth_probability,
                                key});
-    if (record.selection.weight > 0.0f && record.selection.pdf_guide > 0.0f) {
+    if (record.judged && record.selection.weight > 0.0f) {
         const Rgb hit = divide_or_zero(record.hit_weighted, record.beta);
         record.selection.indirect = std::max(luminance(record.f_cos * (L - hit)), 0.0f);
         record.selection.key = key;

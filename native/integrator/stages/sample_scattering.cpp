@@ -93,6 +93,7 @@ void complete_record(
     record.selection.weight /= survival;  // the surviving stand for all
     record.selection.pdf_used = sample.pdf;
     if (guide.mixture != nullptr) {
+        record.judged = true;
         const float smooth = 1.0f - guide.delta_probability;
         record.selection.pdf_guide = smooth * mixture_pdf(*guide.mixture, sample.wi);
         record.selection.pdf_bsdf =
