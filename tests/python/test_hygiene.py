@@ -92,7 +92,8 @@ def test_no_fast_math():
 
 
 def test_commands_can_be_run():
-    for name in ("scenes/render", "scenes/build", "tests/run", "tests/benchmark/run", ".ci/run"):
+    for name in ("scenes/render", "scenes/build", "tests/run", "tests/welch",
+                 "tests/benchmark/run", ".ci/run"):
         assert (ROOT / name).stat().st_mode & 0o111, f"{name} has no run bit"
 
 
