@@ -147,7 +147,7 @@ void RenderSession::Impl::render(const Scene& scene) {
         batches_per_sample = integrator.batches_per_sample();
         progress.state = SessionState::Rendering;
         progress.total_samples = settings.samples;
-        progress.memory_bytes = scene.bytes() + pixels * 200;
+        progress.memory_bytes = scene.bytes() + pixels * (200 + sizeof(double) * passes.size());
     }
     const double cpu_begin = process_cpu_seconds();
     StopCondition stop{cancel, std::nullopt};
