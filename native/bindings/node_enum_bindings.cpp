@@ -73,6 +73,7 @@ void bind_codes(py::module_& m) {
                                            {"Attribute", E::Attribute},
                                            {"InstanceAttribute", E::InstanceAttribute},
                                            {"Tangent", E::Tangent},
+                                           {"Sky", E::Sky},
                                            {"Diffuse", E::Diffuse},
                                            {"Glossy", E::Glossy},
                                            {"Glass", E::Glass},

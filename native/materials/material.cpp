@@ -210,6 +210,10 @@ void Compiler::emit_value(NodeOp op, const OpShape& shape, std::int32_t first_ta
         out_.images.push_back(source_.images[op.mode]);
         op.mode = static_cast<std::uint16_t>(out_.images.size() - 1);
     }
+    if (op.code == NodeOpCode::Sky) {
+        material_.skies.resize(source_.tables.size());
+        material_.skies[op.mode].emplace(detail::read_sky(source_.tables[op.mode]));
+    }
     op.output = next_register_;
     for (std::uint32_t k = 0; k < shape.outputs; ++k) {
         registers_[static_cast<std::size_t>(first_target) + k] = {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "image/texture.h"
 #include "materials/bsdf.h"
 #include "materials/node_program.h"
+#include "materials/sky_model.h"
 
 namespace pharos {
 
@@ -32,8 +34,9 @@ struct Material {
     ProgramSlice surface;       // all closures
     ProgramSlice emission;      // those that emit
     ProgramSlice transparency;  // those that let light straight through
-    std::vector<std::uint8_t> straight_alpha;  // by image use: its alpha is read too
-    std::uint32_t max_closures = 0;            // that one hit can have
+    std::vector<std::optional<SkyModel>> skies;  // of Sky operations, by table
+    std::vector<std::uint8_t> straight_alpha;    // by image use: its alpha is read too
+    std::uint32_t max_closures = 0;              // that one hit can have
     bool constant = false;     // no value operation: closures follow from constants alone
     bool emits = false;        // holds an Emission (or a Principled whose emission may be > 0)
     bool scatters = false;     // holds any other closure

@@ -96,6 +96,7 @@ enum class NodeOpCode : std::uint16_t {
     InstanceAttribute = 46,  // mode = name index of an attribute of instances -> 5 likewise
     Tangent = 47,  // mode = axis of the object it turns around, or 3 + 4 x (name index + 1): along
                    // growing u of that uv map, 3: of the first -> 3
+    Sky = 48,  // direction:3; mode = table index: a sky's parameters in rows of four, read_sky()
     // --- closures; weight:3 is always the first operand ---
     Diffuse = 100,       // weight:3 color:3 roughness:1 normal:3
     Glossy = 101,        // weight:3 color:3 roughness:1 normal:3; mode = Distribution
@@ -292,6 +293,7 @@ inline constexpr std::uint16_t kNormalizeNoiseBit = 0x20;
 inline constexpr std::uint16_t kColorNoiseBit = 0x40;
 inline constexpr std::uint16_t kLegacyNoiseBit = 0x80;  // Blender 3.x
 inline constexpr std::uint16_t kNormalizeCellsBit = 0x80;
+inline constexpr std::size_t kSkyParameters = 16;
 inline constexpr std::uint16_t kDefaultName = 0xffff;
 
 struct NodeOp {

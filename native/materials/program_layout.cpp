@@ -58,6 +58,7 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Bump, OpKind::Hit, "1111113*", 3},
     {NodeOpCode::Attribute, OpKind::Hit, "", 5},
     {NodeOpCode::InstanceAttribute, OpKind::Hit, "", 5},
+    {NodeOpCode::Sky, OpKind::Hit, "3", 3},
     {NodeOpCode::Tangent, OpKind::Hit, "", 3},
     {NodeOpCode::Diffuse, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Glossy, OpKind::Closure, "3313*", 0},
@@ -111,6 +112,9 @@ constexpr OpLayout kLayouts[] = {
             return below(op.mode, kClampBit | kClampFactorBit, kBlendModes);
         case NodeOpCode::Mapping:
             return op.mode <= static_cast<std::uint16_t>(MappingMode::Normal);
+        case NodeOpCode::Sky:
+            return op.mode < program.tables.size() &&
+                   program.tables[op.mode].size() >= kSkyParameters;
         case NodeOpCode::Ramp:
         case NodeOpCode::Curves:
             return table_exists(program, op.mode);

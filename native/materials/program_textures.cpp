@@ -271,4 +271,32 @@ void run_gradient(const Evaluation& e, const NodeOp& op) {
     }
 }
 
+SkyParameters read_sky(std::span<const float> table) {
+    const auto number = [&](std::size_t i, float lower, float upper) {
+        return table[i] > lower ? std::min(table[i], upper) : lower;  // NaN: the lower one
+    };
+    SkyParameters in;
+    in.type = table[0] < 0.5f ? SkyType::Preetham : SkyType::SingleScattering;
+    in.turbidity = number(1, 1.0f, 30.0f);
+    in.elevation = number(2, -0.5f * kPi, 0.5f * kPi);
+    in.rotation = number(3, -1e3f, 1e3f);
+    in.altitude = number(4, 0.0f, 60000.0f);
+    in.air = number(5, 0.0f, 100.0f);
+    in.dust = number(6, 0.0f, 100.0f);
+    in.ozone = number(7, 0.0f, 100.0f);
+    in.sun_disc = table[8] > 0.5f;
+    in.sun_size = number(9, 0.0f, kPi);
+    in.sun_intensity = number(10, 0.0f, 1e6f);
+    in.sun_direction = Vec3(table[12], table[13], table[14]);
+    return in;
+}
+
+void run_sky(const Evaluation& e, const NodeOp& op) {
+    const Operand direction = e.operand(op, 0);
+    const SkyModel& sky = *e.material.skies[op.mode];
+    for (std::size_t i = 0; i < e.lanes; ++i) {
+        e.store(op, i, sky.radiance(normalize_or(direction.vector(i), Vec3(0.0f, 0.0f, 1.0f))));
+    }
+}
+
 }  // namespace pharos::detail

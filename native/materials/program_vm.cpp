@@ -63,6 +63,7 @@ constexpr RunFunction kRun[] = {
     run_attribute,
     run_instance_attribute,
     run_tangent,
+    run_sky,
 };
 
 }  // namespace

@@ -91,6 +91,10 @@ struct Evaluation {
     }
 };
 
+// The parameters in the order the exporter writes them: type, turbidity, elevation, rotation;
+// altitude, air, dust, ozone; sun disc, sun size, sun intensity; at 12 the sun's direction.
+[[nodiscard]] SkyParameters read_sky(std::span<const float> table);
+
 // Runs value operations in order.
 void run_values(const Evaluation& e, std::span<const NodeOp> ops);
 
@@ -144,6 +148,7 @@ void run_magic(const Evaluation& e, const NodeOp& op);
 void run_brick(const Evaluation& e, const NodeOp& op);
 void run_bump(const Evaluation& e, const NodeOp& op);
 void run_attribute(const Evaluation& e, const NodeOp& op);
+void run_sky(const Evaluation& e, const NodeOp& op);
 void run_tangent(const Evaluation& e, const NodeOp& op);
 void run_instance_attribute(const Evaluation& e, const NodeOp& op);
 

@@ -23,6 +23,9 @@ MapSize map_size(const Scene& scene) {
     }
     std::uint32_t width = 0;
     for (const NodeOp& op : scene.world.program.ops) {
+        if (op.code == NodeOpCode::Sky && scene.world.skies[op.mode]->has_disc()) {
+            width = kMaxWidth;  // the sun's disc is half a degree wide
+        }
         if (op.code == NodeOpCode::EnvironmentImage &&
             op.mode < scene.world.program.images.size()) {
             const std::uint32_t image = scene.world.program.images[op.mode].image;

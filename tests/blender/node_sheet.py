@@ -102,7 +102,7 @@ def settings(samples: int = 1) -> None:
     cycles.film_exposure, cycles.seed = 1.0, 0
 
 
-def _pictures(cases) -> dict[str, np.ndarray]:
+def pictures_of(cases) -> dict[str, np.ndarray]:
     harness.new_scene(SIDE, SIDE, samples=1)
     settings()
     values = np.zeros((SIDE, SIDE, 4), np.float32)
@@ -127,7 +127,7 @@ def differences(cases) -> dict[str, float]:
     found = {}
     for first in range(0, len(cases), TILES):
         part = cases[first : first + TILES]
-        pictures = _pictures(part)
+        pictures = pictures_of(part)
         for i, case in enumerate(part):
             row, column = divmod(i, SIDE // TILE)
             a, b = (

@@ -49,7 +49,30 @@ def _environment(f, node, scope, socket):
     return _memoised_image(f, node, scope, make)
 
 
+_SKIES = {"PREETHAM": 0.0, "HOSEK_WILKIE": 0.0}
+
+
+def _sky(f, node, scope, socket):
+    kind = node.sky_type
+    if kind == "HOSEK_WILKIE":
+        f.unsupported(node, "the sky of Hosek and Wilkie (that of Preetham is shown)")
+    elif kind not in _SKIES:
+        f.report.info(f.owner, "The scattered sky has spectra of its own: near Cycles', not equal.")
+    vector = vector_or(f, node, scope, lambda: direction(f))
+    single = kind not in _SKIES
+    # Dust became aerosols in Blender 5.
+    dust = node.dust_density if hasattr(node, "dust_density") else node.aerosol_density
+    rows = [
+        (_SKIES.get(kind, 1.0), node.turbidity, node.sun_elevation, node.sun_rotation),
+        (node.altitude, node.air_density, dust, node.ozone_density),
+        (node.sun_disc, node.sun_size, node.sun_intensity, 0.0),
+        (*((0.0, 0.0, 1.0) if single else node.sun_direction), 0.0),
+    ]
+    return f.program.op("Sky", [vector], 3, f.program.add_table(rows))
+
+
 IMAGES = {
     "ShaderNodeTexImage": _image,
     "ShaderNodeTexEnvironment": _environment,
+    "ShaderNodeTexSky": _sky,
 }
