@@ -125,7 +125,7 @@ double percent_of_time(const Rendered& result, std::span<const char* const> skip
     return 100.0 * share / all;
 }
 
-TEST(RenderSession, SkippedStagesTakeNoTime) {
+TEST(RenderSessionStatistics, SkippedStagesTakeNoTime) {
     SceneBuilder sky;
     const auto white = sky.material("white", diffuse_program(Rgb(0.8f)));
     sky.object(box_mesh("box", Vec3(-1), Vec3(1)), white);
