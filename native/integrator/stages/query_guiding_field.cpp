@@ -131,6 +131,9 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
 
 std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch) {
     if (!context.guiding.active()) {
+        // Whatever a guided pass left behind must not speak for this one.
+        batch.guides.clear();
+        batch.vertex_record.clear();
         return 0;
     }
     const std::size_t count = batch.surfaces.size();
