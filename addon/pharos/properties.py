@@ -12,7 +12,7 @@ from bpy.props import (
 )
 
 _MAX_SEED = 2**31 - 1
-_GUIDING_DEFAULT = "OFF"
+_GUIDING_DEFAULT = "NEURAL"
 _GUIDING_MODES = (
     ("NEURAL", "Neural", "A small network learns while it renders"),
     ("SLIDES", "Single Lobe", "One lobe a point, for comparison"),

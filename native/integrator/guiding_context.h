@@ -15,6 +15,7 @@ namespace pharos {
 struct GuidingContext {
     const GuidingField* field = nullptr;        // null: the field has nothing to say yet
     const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
+    bool selection_serves = true;               // false: it is off everywhere
     float fixed_share = 0.0f;                   // the least share, where there is a selection
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;
@@ -24,6 +25,12 @@ struct GuidingContext {
     std::span<const float> pixel_estimate;  // luminance per pixel of the window; empty: none yet
 
     [[nodiscard]] bool active() const { return field != nullptr || record; }
+
+    // Some vertex may be guided.
+    [[nodiscard]] bool serves() const {
+        return field != nullptr &&
+               (fixed_share > 0.0f || (selection != nullptr && selection_serves));
+    }
 };
 
 // What the paths of a pass teach, one buffer a thread; order is restored by the records' keys.

@@ -11,6 +11,8 @@ namespace pharos {
 namespace {
 
 constexpr double kRecordsPerPass = 32768.0;
+// Where paths are quiet, learning takes no more than a few percent of a pass: records a vertex.
+constexpr double kEasyRecords = 0.06;
 constexpr float kFirstRecordProbability = 0.1f;
 constexpr float kSlidesShare = 0.5f;
 
@@ -23,10 +25,11 @@ constexpr float kHardShare = 0.5f;
 constexpr std::uint32_t kHardTrialPasses = 12;
 constexpr double kHardMaxMomentRatio = 0.97;
 constexpr std::uint32_t kProbingPasses = 8;
-constexpr std::uint32_t kEstimateEveryPass = 16;  // then every fourth
+constexpr std::uint32_t kEstimateEveryPass = 16;  // then every fourth; quiet pictures sooner
+constexpr std::uint32_t kEasyEstimateEveryPass = 4;
 constexpr int kBlurRadius = 3;
 constexpr float kEstimateFloor = 0.1f;  // of the picture's mean
-constexpr std::uint32_t kRampPasses = 4;
+constexpr std::uint32_t kRampPasses = 2;
 
 // The adjoint must have been learned before paths are killed by it: after so many paths.
 constexpr std::uint64_t kPathsBeforeRoulette = 1u << 18;
@@ -96,6 +99,7 @@ GuidingContext GuideController::next_pass() const {
         return context;
     }
     context.selection = &*selection_;
+    context.selection_serves = status_.guided_share > 0.0;
     context.fixed_share = hard_ ? kHardShare : 0.0f;
     context.probe = true;
     const auto patience = static_cast<std::uint32_t>(
@@ -134,6 +138,9 @@ void GuideController::learn(RecordBuffer records,
         status_.guided_share = hard_ ? 1.0 : selected.guided_share;
         status_.moment_ratio = selected.moment_ratio;
         status_.closed = selected.closed && !hard_;
+        if (!hard_ && pass_ > 0) {
+            wanted = std::min(wanted, kEasyRecords * work.vertices);
+        }
         if (pass_ >= kProbingPasses) {
             wanted *= std::clamp(4.0 * status_.guided_share, 1.0 / 16.0, 1.0);
         }
@@ -144,7 +151,7 @@ void GuideController::learn(RecordBuffer records,
         const double per_probability = recorded / static_cast<double>(record_probability_);
         record_probability_ = static_cast<float>(std::clamp(wanted / per_probability, 0.005, 1.0));
     }
-    if (pass_ < kEstimateEveryPass || pass_ % 4 == 0) {
+    if (pass_ < (hard_ ? kEstimateEveryPass : kEasyEstimateEveryPass) || pass_ % 4 == 0) {
         update_pixel_estimate(film);
     }
     ++pass_;

@@ -109,9 +109,7 @@ def set_world(color) -> None:
     world.use_nodes = False
     world.color = color
     if world.use_nodes:
-        background = next(
-            n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground"
-        )
+        background = next(n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground")
         background.inputs["Color"].default_value = (*color, 1.0)
         background.inputs["Strength"].default_value = 1.0
 

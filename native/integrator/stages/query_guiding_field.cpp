@@ -105,6 +105,9 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
     if (batch.bsdfs[s].total_sample_weight <= 0.0f || batch.counters[path].terminate_at_surface) {
         return;
     }
+    if (!recorded && !guiding.serves()) {
+        return;
+    }
     const LobeSummary lobes = summarize(batch.bsdfs[s]);
     if (lobes.guidable < 0.25f) {
         return;
