@@ -102,6 +102,37 @@ TEST(Guided, IsBitEqualForAnyNumberOfThreads) {
     }
 }
 
+// A pass without a guide after one with it is what it would have been without either: when the gate
+// closes, nothing of the last guided pass may speak for the next paths.
+TEST(Guided, PassesAfterTheGuideAreThoseWithoutIt) {
+    ThreadPool pool(2);
+    SceneDescription description = two_rooms(40, 30, 2);
+    const FilmDescription frame = description.film;
+    SceneReport report;
+    const CancelFlag cancel;
+    const auto scene = build_scene(std::move(description), cancel, report);
+    const GuidingField field = poisoned_field(scene->bounds, Vec3(0.6f, 0.0f, 0.8f), pool);
+    ASSERT_GT(field.generation(), 0u);
+    const auto second_pass = [&](const GuidingContext& first) {
+        Integrator integrator(*scene, pool);
+        SharedFilm before(frame);
+        SharedFilm film(frame);
+        EXPECT_TRUE(integrator.render_pass({0, 1, 1.0}, first, before, {cancel, {}}));
+        EXPECT_TRUE(integrator.render_pass({1, 1, 1.0}, GuidingContext{}, film, {cancel, {}}));
+        std::vector<float> pixels(std::size_t{frame.crop_width} * frame.crop_height * 4);
+        film.film.read(FilmPass::Combined, pixels);
+        return pixels;
+    };
+    GuidingContext guiding;
+    guiding.field = &field;
+    guiding.fixed_share = 0.5f;
+    guiding.record = true;
+    guiding.record_probability = 1.0f;
+    const std::vector<float> guided = second_pass(guiding);
+    const std::vector<float> unguided = second_pass({});
+    EXPECT_EQ(0, std::memcmp(guided.data(), unguided.data(), guided.size() * sizeof(float)));
+}
+
 // The same mean with and without the guide, and less noise with it where light is hard to find.
 TEST(GuidedStatistics, AgreesWithUnguidedAndIsLessNoisy) {
     SceneDescription unguided = two_rooms(48, 36, 128);
