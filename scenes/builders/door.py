@@ -9,13 +9,16 @@ DOOR_ANGLE = 25.0
 
 
 def _walls_with_doorway(plaster, frame):
-    """The wall between the rooms, 12 cm thick, with a doorway 0.9 x 2.1 m, and its frame."""
+    """The wall between the rooms, 12 cm thick, with a doorway 0.9 x 2.1 m, and its frame.
+
+    The frame stands 3 mm proud of the reveal: of coincident faces Cycles loses light, Pharos not.
+    """
     kit.box("wall left of the door", (-2, 2.5, 0), (0.35, 2.62, 3), plaster)
     kit.box("wall right of the door", (1.25, 2.5, 0), (2, 2.62, 3), plaster)
     kit.box("wall above the door", (0.35, 2.5, 2.1), (1.25, 2.62, 3), plaster)
-    kit.box("frame left", (0.29, 2.47, 0), (0.35, 2.65, 2.16), frame)
-    kit.box("frame right", (1.25, 2.47, 0), (1.31, 2.65, 2.16), frame)
-    kit.box("frame top", (0.29, 2.47, 2.1), (1.31, 2.65, 2.16), frame)
+    kit.box("frame left", (0.29, 2.47, 0), (0.353, 2.65, 2.097), frame)
+    kit.box("frame right", (1.247, 2.47, 0), (1.31, 2.65, 2.097), frame)
+    kit.box("frame top", (0.29, 2.47, 2.097), (1.31, 2.65, 2.16), frame)
 
 
 def _door(wood, brass):
