@@ -35,6 +35,9 @@ class Film {
 
     [[nodiscard]] std::uint32_t height() const { return height_; }
 
+    // Factor on everything that read() gives of light.
+    [[nodiscard]] float exposure() const { return exposure_; }
+
     // Adds one sample to a pixel; `even` says which half the pass belongs to. Non-finite radiance
     // must have been dropped by the caller (and counted): DCHECKed here.
     void add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even);

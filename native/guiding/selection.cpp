@@ -1,5 +1,6 @@
 #include "guiding/selection.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -22,6 +23,7 @@ constexpr double kPriorCount = 128.0;  // weight of the parent in a cell's mean,
 constexpr double kMaxMoment = 50.0;    // of one record, in units of the picture's variance
 // Counted work, in the proportion that whole renders showed: of a guided vertex beyond that of any
 // (inference, two more densities, its records and their training), and of any vertex.
+constexpr double kMaxContribution = 50.0;  // of one record, in pixels
 constexpr double kGuideCost = 500.0;
 constexpr double kVertexCost = 900.0;
 constexpr double kStay = 0.8;        // hysteresis: a cell that is on stays on with less,
@@ -46,6 +48,7 @@ constexpr std::uint32_t kProbePasses = 2;
 // order of records does not matter.
 constexpr double kMomentUnit = 0x1p-32;
 constexpr double kSquareUnit = 0x1p-20;
+constexpr double kContributionUnit = 0x1p-32;
 
 // Sums over records: second moments per share, squares of the differences to share 0, count.
 struct Moments {
@@ -69,6 +72,27 @@ struct Moments {
         count *= kDecay;
     }
 };
+
+// Contributions to the pixel, in units of what it shows: expected by A, and arrived. Whole numbers
+// of kContributionUnit while a pass adds up.
+struct Contributions {
+    double expected = 0.0;
+    double arrived = 0.0;
+};
+
+// One record counts for 50 pixels at most, so that neither a firefly nor a single wrong A decides.
+Contributions contributions(const SelectionRecord& r) {
+    const auto p = static_cast<double>(r.pdf_used);
+    const double hit = r.hit_radiance > 0.0f ? static_cast<double>(r.hit_radiance) /
+                                                   (static_cast<double>(r.hit_pdf_light) + p)
+                                             : 0.0;
+    const double indirect = r.indirect > 0.0f ? static_cast<double>(r.indirect) / p : 0.0;
+    const double scale = std::sqrt(static_cast<double>(r.weight));
+    const auto limited = [scale](double x) {
+        return std::min(scale * std::max(x, 0.0), kMaxContribution);
+    };
+    return {limited(static_cast<double>(r.expected)), limited(hit + indirect)};
+}
 
 struct PassSums {
     std::array<std::int64_t, kShares> moment{};
@@ -192,6 +216,7 @@ struct GuideSelection::Impl {
     std::vector<Cell> cells;
     std::vector<Parent> parents;
     Moments global;
+    std::array<Contributions, 2> contributed;  // diffuse, glossy
     double variance_sum = 0.0;
     double variance_count = 0.0;
     std::uint32_t judged_passes = 0;
@@ -265,6 +290,8 @@ GuideSelection::Impl::Cell& GuideSelection::Impl::touch(std::uint32_t index) {
 }
 
 void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records, double variance) {
+    std::array<std::int64_t, 2> expected{};
+    std::array<std::int64_t, 2> arrived{};
     for (const SelectionRecord& r : records) {
         if (!is_valid(r)) {
             continue;
@@ -279,6 +306,9 @@ void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records,
         if (!finite) {
             continue;
         }
+        const Contributions c = contributions(r);
+        expected[r.glossy] += static_cast<std::int64_t>(c.expected / kContributionUnit + 0.5);
+        arrived[r.glossy] += static_cast<std::int64_t>(c.arrived / kContributionUnit + 0.5);
         // One record counts for 50 variances at most: its four moments shrink together.
         const double unit =
             std::min(1.0, kMaxMoment * variance / std::max(largest, 1e-300)) / variance;
@@ -290,6 +320,12 @@ void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records,
             sums.moment[a] += static_cast<std::int64_t>(value / kMomentUnit + 0.5);
             sums.square[a] += static_cast<std::int64_t>(gain * gain / kSquareUnit + 0.5);
         }
+    }
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        Contributions& sum = contributed[kind];
+        sum.expected =
+            kDecay * sum.expected + static_cast<double>(expected[kind]) * kContributionUnit;
+        sum.arrived = kDecay * sum.arrived + static_cast<double>(arrived[kind]) * kContributionUnit;
     }
 }
 
@@ -368,11 +404,16 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
     const double enough = kOverrideShare * noise_factor;
     override_on = on_share > (override_on ? kOverrideStay * enough : enough);
     statistics.guided_share = override_on ? 1.0 : on_share;
-    double best = 1.0;
-    for (std::size_t a = 1; a < kShares && global.moment[0] > 0.0; ++a) {
-        best = std::min(best, global.moment[a] / global.moment[0]);
+    if (global.moment[0] > 0.0) {
+        const auto best = std::min_element(global.moment.begin() + 1, global.moment.end());
+        statistics.moment_ratio = *best / global.moment[0];
+        statistics.best_share = kShare[static_cast<std::size_t>(best - global.moment.begin())];
     }
-    statistics.moment_ratio = best;
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        if (contributed[kind].arrived > 0.0) {
+            statistics.calibration[kind] = contributed[kind].expected / contributed[kind].arrived;
+        }
+    }
     return statistics;
 }
 

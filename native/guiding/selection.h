@@ -9,9 +9,11 @@
 //   S_a += w [ N_a^2 + (pa / p_used) (2 N_a B_a + B_a^2) ],  w = (lum(T) / I_pixel)^2.
 // A cell turns on when S_0 / n - S_a / n exceeds the cost of guiding in units of the picture's
 // variance per unit of work, with hysteresis and a confidence margin, so that one firefly decides
-// nothing. Deterministic: a pass adds up whole numbers, so the order of records does not matter.
+// nothing. Beside it the field's A is held against what arrived: an adjoint has to add up.
+// Deterministic: a pass adds up whole numbers, so the order of records does not matter.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -37,6 +39,7 @@ struct SelectionRecord {
     float pdf_used = 0.0f;       // of the mixture the direction was sampled with
     float pdf_bsdf = 0.0f;
     float pdf_guide = 0.0f;
+    float expected = 0.0f;  // what the guide's A says of hit and indirect together, before sampling
     std::uint64_t key = 0;
 };
 
@@ -49,7 +52,10 @@ struct SelectionPass {
 
 struct SelectionStatistics {
     double guided_share = 0.0;  // of the recorded vertices, by the alpha of their cells
-    double moment_ratio = 1.0;  // global best S_a / S_0
+    double moment_ratio = 1.0;  // global best S_a / S_0 with a > 0; over 1: it would do harm
+    float best_share = 0.0f;    // its a; 0: nothing was judged yet
+    // What A expected over what arrived, of diffuse and of glossy vertices; 0: unknown.
+    std::array<double, 2> calibration{};
     std::uint32_t cells_on = 0;
     std::uint32_t cells = 0;  // with records
     bool closed = false;      // the gate: nearly nothing is on, recording and training stop

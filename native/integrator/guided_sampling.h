@@ -19,6 +19,7 @@ struct Guide {
     const VmfMixture* mixture = nullptr;
     float share = 0.0f;
     float delta_probability = 0.0f;
+    bool glossy = false;  // the lobes it serves are
 };
 
 [[nodiscard]] inline float guided_pdf(const Guide& guide, float bsdf_pdf, const Vec3& wi) {

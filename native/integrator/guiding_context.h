@@ -2,6 +2,7 @@
 // null and false when guiding is off: the stages then skip it without a look at any path.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,7 +21,9 @@ struct GuidingContext {
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;
     float record_probability = 0.0f;  // of a camera sample
-    bool roulette = false;            // weight window where the guide is on
+    // Weight window where the guide is on, by A times this as the adjoint, at diffuse and at glossy
+    // vertices; 0: roulette by the albedos there too.
+    std::array<float, 2> adjoint_scale{};
     WeightWindow window;
     std::span<const float> pixel_estimate;  // luminance per pixel of the window; empty: none yet
 

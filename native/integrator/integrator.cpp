@@ -12,19 +12,21 @@ namespace {
 constexpr std::uint32_t kIncidentSalt = 0x6a09e667u;
 const PassLayout kNoPasses;
 
-// Adds the passes on request of a batch's samples to the film.
-void add_passes(const PathBatch& batch,
-                const PassLayout& passes,
-                std::uint32_t first_pixel,
-                double weight,
-                Film& film) {
+// Adds a batch's samples, those of the passes on request first.
+void add_to_film(const PathBatch& batch,
+                 const PassSettings& pass,
+                 const BatchWork& work,
+                 const PassLayout& passes,
+                 Film& film) {
     const std::size_t size = passes.sample_size();
-    if (size == 0) {
-        return;
-    }
-    for (std::uint32_t root = 0; root < batch.roots; ++root) {
-        film.add_passes(
-            first_pixel + root, std::span(batch.root_passes).subspan(root * size, size), weight);
+    for (std::uint32_t root = 0; root < work.pixels; ++root) {
+        const std::uint32_t pixel = work.first_pixel + root;
+        const std::uint32_t color = (pixel % film.width() + pixel / film.width()) % 2;
+        const double weight = pass.weight[color];
+        if (size > 0) {
+            film.add_passes(pixel, std::span(batch.root_passes).subspan(root * size, size), weight);
+        }
+        film.add(pixel, batch.root_sample[root], weight, work.sample % 2 == 0);
     }
 }
 
@@ -191,11 +193,7 @@ bool Integrator::render_pass(const PassSettings& pass,
             render_batch(context, {first, count, sample}, worker);
             timed(worker.statistics, Stage::AccumulateFilm, [&] {
                 const std::shared_lock lock(film.mutex);
-                add_passes(worker.batch, passes_, first, pass.weight, film.film);
-                for (std::uint32_t root = 0; root < count; ++root) {
-                    film.film.add(
-                        first + root, worker.batch.root_sample[root], pass.weight, sample % 2 == 0);
-                }
+                add_to_film(worker.batch, pass, {first, count, sample}, passes_, film.film);
                 return count;
             });
             film.serial.fetch_add(1, std::memory_order_relaxed);

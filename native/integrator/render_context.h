@@ -13,11 +13,12 @@
 
 namespace pharos {
 
-// One pass: `samples` consecutive samples of every pixel, all with one film weight.
+// One pass: `samples` consecutive samples of every pixel.
 struct PassSettings {
     std::uint32_t first_sample = 0;
     std::uint32_t samples = 1;
-    double weight = 1.0;
+    // On the film, by the colour of the pixel on a checkerboard: (x + y) % 2 in the window.
+    std::array<double, 2> weight{1.0, 1.0};
 };
 
 struct RenderContext {

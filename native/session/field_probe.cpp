@@ -36,7 +36,7 @@ void train(const Scene& scene, Integrator& integrator, ThreadPool& pool, Guiding
             context.field = &field;
             context.fixed_share = kShare;
         }
-        integrator.render_pass({sample, 1, 1.0}, context, picture, {never, {}});
+        integrator.render_pass({sample, 1}, context, picture, {never, {}});
         const RecordBuffer records = integrator.take_records();
         field.train(records.radiance, pool);
         const double recorded = static_cast<double>(records.radiance.size());

@@ -1,10 +1,9 @@
 #include "session/guide_controller.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <limits>
 
-#include "core/color.h"
+#include "session/pixel_estimate.h"
 
 namespace pharos {
 
@@ -16,55 +15,31 @@ constexpr double kEasyRecords = 0.06;
 constexpr float kFirstRecordProbability = 0.1f;
 constexpr float kSlidesShare = 0.5f;
 
-// A scene whose paths differ from their pixels by this much (relative variance) is hard: paths that
-// find the light are too rare to prove the guide's worth from records of unguided paths. There the
-// guide serves everywhere at once, as long as the second moments measured under it do not speak
-// against it.
-constexpr double kHardVariance = 4.0;
-constexpr float kHardShare = 0.5f;
+// In a hard scene (PassWeights) paths that find the light are too rare to prove the guide's worth
+// region by region. There it serves everywhere at once, in every pass before which the second
+// moments of all records together speak for it: they speak against a guide that learned nothing, or
+// lies, from the first pass on.
+constexpr float kMaxHardShare = 0.5f;
 constexpr std::uint32_t kHardTrialPasses = 12;
-constexpr double kHardMaxMomentRatio = 0.97;
+constexpr double kHardMaxMomentRatio = 0.97;        // after so many passes; until then
+constexpr double kHardFirstMaxMomentRatio = 0.999;  // any gain will do
 constexpr std::uint32_t kProbingPasses = 8;
 constexpr std::uint32_t kEstimateEveryPass = 16;  // then every fourth; quiet pictures sooner
 constexpr std::uint32_t kEasyEstimateEveryPass = 4;
-constexpr int kBlurRadius = 3;
-constexpr float kEstimateFloor = 0.1f;  // of the picture's mean
-constexpr std::uint32_t kRampPasses = 2;
+
+// A pass takes this part of the samples so far: the field and the selection change less and less,
+// and every pass costs something whatever its size.
+constexpr std::uint32_t kHardPassPart = 16;
+constexpr std::uint32_t kEasyPassPart = 4;
 
 // The adjoint must have been learned before paths are killed by it: after so many paths.
 constexpr std::uint64_t kPathsBeforeRoulette = 1u << 18;
 constexpr std::uint32_t kMinPassesBeforeRoulette = 4;
 constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
-
-// Separable box blur with clamped edges, along one axis.
-void blur_axis(const std::vector<float>& in,
-               std::vector<float>& out,
-               std::array<int, 2> size,
-               int axis) {
-    const int width = size[0];
-    const int height = size[1];
-    for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-            double sum = 0.0;
-            int count = 0;
-            for (int d = -kBlurRadius; d <= kBlurRadius; ++d) {
-                const int u = axis == 0 ? x + d : x;
-                const int v = axis == 0 ? y : y + d;
-                if (u >= 0 && u < width && v >= 0 && v < height) {
-                    sum += static_cast<double>(in[static_cast<std::size_t>(v * width + u)]);
-                    ++count;
-                }
-            }
-            out[static_cast<std::size_t>(y * width + x)] = static_cast<float>(sum / count);
-        }
-    }
-}
+// and its sum over all records must be that of what arrived within this factor.
+constexpr double kMaxCalibration = 4.0;
 
 }  // namespace
-
-double pass_weight(std::uint32_t pass) {
-    return std::min(1.0, static_cast<double>(pass + 1) / kRampPasses);
-}
 
 GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels)
     : mode_(mode),
@@ -79,6 +54,19 @@ GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std
     field_.emplace(slides ? GuidingConfig::slides() : GuidingConfig::neural(), scene_box);
     if (!slides) {
         selection_.emplace(scene_box);
+    }
+}
+
+std::uint32_t GuideController::most_samples(std::uint32_t done) const {
+    if (!learning()) {
+        return std::numeric_limits<std::uint32_t>::max();
+    }
+    return std::max<std::uint32_t>(1, done / (hard_ ? kHardPassPart : kEasyPassPart));
+}
+
+void GuideController::see(const Film& film, std::uint32_t done) {
+    if (enabled_) {
+        weights_.see(film, done);
     }
 }
 
@@ -100,13 +88,15 @@ GuidingContext GuideController::next_pass() const {
     }
     context.selection = &*selection_;
     context.selection_serves = status_.guided_share > 0.0;
-    context.fixed_share = hard_ ? kHardShare : 0.0f;
+    context.fixed_share = hard_share_;
     context.probe = true;
     const auto patience = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(kPathsBeforeRoulette / std::max<std::uint64_t>(1, pixels_),
                                   kMinPassesBeforeRoulette,
                                   kMaxPassesBeforeRoulette));
-    context.roulette = pass_ >= patience;
+    if (pass_ >= patience) {
+        context.adjoint_scale = adjoint_scale_;
+    }
     return context;
 }
 
@@ -134,8 +124,9 @@ void GuideController::learn(RecordBuffer records,
                                               static_cast<double>(records.recorded_paths)
                                         : 0.0;
         const SelectionStatistics selected = selection_->update(records.selection, counted);
-        judge_hardness(counted.relative_variance, selected.moment_ratio);
-        status_.guided_share = hard_ ? 1.0 : selected.guided_share;
+        calibrate(selected.calibration);
+        judge_hardness(selected);
+        status_.guided_share = hard_share_ > 0.0f ? 1.0 : selected.guided_share;
         status_.moment_ratio = selected.moment_ratio;
         status_.closed = selected.closed && !hard_;
         if (!hard_ && pass_ > 0) {
@@ -152,7 +143,7 @@ void GuideController::learn(RecordBuffer records,
         record_probability_ = static_cast<float>(std::clamp(wanted / per_probability, 0.005, 1.0));
     }
     if (pass_ < (hard_ ? kEstimateEveryPass : kEasyEstimateEveryPass) || pass_ % 4 == 0) {
-        update_pixel_estimate(film);
+        pixel_estimate_ = estimate_pixels(film);
     }
     ++pass_;
 }
@@ -163,38 +154,23 @@ void GuideController::rest() {
     }
 }
 
-void GuideController::judge_hardness(double relative_variance, double moment_ratio) {
-    if (pass_ == 1) {
-        hard_ = relative_variance > kHardVariance;
-    } else if (pass_ >= kHardTrialPasses && moment_ratio > kHardMaxMomentRatio) {
-        hard_ = false;
+// A is only an adjoint where what it expects arrives.
+void GuideController::calibrate(const std::array<double, 2>& calibration) {
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        const double c = calibration[kind];
+        const bool plausible = c >= 1.0 / kMaxCalibration && c <= kMaxCalibration;
+        adjoint_scale_[kind] = plausible ? static_cast<float>(1.0 / c) : 0.0f;
     }
 }
 
-void GuideController::update_pixel_estimate(const Film& film) {
-    const std::size_t pixels = std::size_t{film.width()} * film.height();
-    std::vector<float> combined(pixels * 4);
-    film.read(FilmPass::Combined, combined);
-    std::vector<float> value(pixels);
-    double mean = 0.0;
-    for (std::size_t i = 0; i < pixels; ++i) {
-        value[i] = luminance(Rgb(combined[4 * i], combined[4 * i + 1], combined[4 * i + 2]));
-        mean += static_cast<double>(value[i]);
+void GuideController::judge_hardness(const SelectionStatistics& selected) {
+    if (pass_ == 1) {
+        hard_ = weights_.hard();
+    } else if (pass_ >= kHardTrialPasses && selected.moment_ratio > kHardMaxMomentRatio) {
+        hard_ = false;
     }
-    mean /= static_cast<double>(pixels);
-    pixel_estimate_.clear();
-    if (!(mean > 0.0)) {
-        return;
-    }
-    const std::array<int, 2> size{static_cast<int>(film.width()), static_cast<int>(film.height())};
-    std::vector<float> half(pixels);
-    blur_axis(value, half, size, 0);
-    blur_axis(half, value, size, 1);
-    const float floor = kEstimateFloor * static_cast<float>(mean);
-    for (float& v : value) {
-        v = std::max(v, floor);
-    }
-    pixel_estimate_ = std::move(value);
+    const bool gains = selected.moment_ratio < kHardFirstMaxMomentRatio;
+    hard_share_ = hard_ && gains ? std::min(selected.best_share, kMaxHardShare) : 0.0f;
 }
 
 }  // namespace pharos

@@ -4,6 +4,7 @@
 // All decisions follow from counted work and from earlier passes; none looks at a clock.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -14,18 +15,24 @@
 #include "integrator/render_context.h"
 #include "scene/scene.h"
 #include "session/guide_status.h"
+#include "session/pass_weights.h"
 
 namespace pharos {
-
-// Film weight of a pass, by its number alone: the same whether the guide turned on or not.
-[[nodiscard]] double pass_weight(std::uint32_t pass);
 
 class GuideController {
   public:
     GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels);
 
-    // Samples the next pass should take at most: one while something is learned.
     [[nodiscard]] bool learning() const { return enabled_ && !status_.closed; }
+
+    // Samples that the next pass should take at most, after `done` of them: few while much is
+    // learned from each.
+    [[nodiscard]] std::uint32_t most_samples(std::uint32_t done) const;
+
+    // Looks at the picture after `done` samples, before it learns from the last of them.
+    void see(const Film& film, std::uint32_t done);
+
+    [[nodiscard]] const PassWeights& weights() const { return weights_; }
 
     // What the next pass may use. Valid until learn() is called.
     [[nodiscard]] GuidingContext next_pass() const;
@@ -39,18 +46,21 @@ class GuideController {
     [[nodiscard]] const GuideStatus& status() const { return status_; }
 
   private:
-    void judge_hardness(double relative_variance, double moment_ratio);
-    void update_pixel_estimate(const Film& film);
+    void calibrate(const std::array<double, 2>& calibration);
+    void judge_hardness(const SelectionStatistics& selected);
 
     GuidingMode mode_;
     bool enabled_;
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
     bool hard_ = false;
+    float hard_share_ = 0.0f;  // of the guide, at least, everywhere
+    std::array<float, 2> adjoint_scale_{};
     float record_probability_;
     std::optional<GuidingField> field_;
     std::optional<GuideSelection> selection_;
     std::vector<float> pixel_estimate_;
+    PassWeights weights_;
     GuideStatus status_;
 };
 

@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kPathsPerPass = 1u << 19;
         std::max<std::uint64_t>(1, kPathsPerPass / std::max<std::uint64_t>(1, pixels));
     const auto samples = static_cast<std::uint32_t>(
         std::min<std::uint64_t>({fitting, std::max<std::uint32_t>(1, done), total - done}));
-    return {done, samples, 1.0};
+    return {done, samples};
 }
 
 }  // namespace pharos

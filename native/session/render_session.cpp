@@ -155,17 +155,15 @@ void RenderSession::Impl::render(const Scene& scene) {
     std::uint32_t done = 0;
     while (done < settings.samples) {
         PassSettings pass = next_pass(done, settings.samples, pixels);
-        if (guide.learning()) {
-            pass.samples = 1;
-        }
-        // By the number of the sample, so that a pass of several keeps the rule.
-        pass.weight = guide.status().enabled ? pass_weight(done) : 1.0;
+        pass.samples = std::min(pass.samples, guide.most_samples(done));
+        pass.weight = guide.weights().of(done);
         const BatchStatistics before = integrator.statistics();
         if (!integrator.render_pass(pass, guide.next_pass(), *shared_film, stop)) {
             finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
             return;
         }
         done += pass.samples;
+        guide.see(shared_film->film, done);
         learn(guide, integrator, before, pool);
         finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
         if (settings.time_limit > 0.0f) {

@@ -113,6 +113,7 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
         return;
     }
     const bool glossy = lobes.glossy > 0.5f;
+    guide.glossy = glossy;
     if (recorded) {
         batch.vertex_record[s] = open_record(context, s, glossy, batch);
     }

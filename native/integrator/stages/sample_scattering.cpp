@@ -94,6 +94,7 @@ void complete_record(
     record.selection.pdf_used = sample.pdf;
     if (guide.mixture != nullptr) {
         record.judged = true;
+        record.selection.expected = luminance(batch.traits[s].albedo) * guide.mixture->A * kInvPi;
         const float smooth = 1.0f - guide.delta_probability;
         record.selection.pdf_guide = smooth * mixture_pdf(*guide.mixture, sample.wi);
         record.selection.pdf_bsdf =
@@ -147,10 +148,12 @@ RouletteDecision roulette(const RenderContext& context,
                           const PathBatch& batch) {
     const std::uint32_t path = batch.surface_path[s];
     const GuidingContext& guiding = context.guiding;
-    if (guiding.roulette && batch.guides[s].share > 0.0f && !guiding.pixel_estimate.empty()) {
+    const bool guided = !batch.guides.empty() && batch.guides[s].share > 0.0f;
+    const float adjoint_scale = guided ? guiding.adjoint_scale[batch.guides[s].glossy] : 0.0f;
+    if (adjoint_scale > 0.0f && !guiding.pixel_estimate.empty()) {
         const float pixel = guiding.pixel_estimate[batch.root_pixel[batch.root[path]]];
         const float r = luminance(batch.beta[path] * batch.traits[s].albedo) *
-                        batch.guides[s].mixture->A * kInvPi / pixel;
+                        batch.guides[s].mixture->A * (adjoint_scale * kInvPi) / pixel;
         const bool may_split = batch.counters[path].bounce > 0 && batch.paths < batch.capacity;
         return weight_window(guiding.window, r, may_split, u);
     }

@@ -86,11 +86,11 @@ double error_of(const Box& box) {
     GuidingContext guiding;
     guiding.field = &field;
     guiding.fixed_share = 0.5f;
-    guiding.roulette = box.roulette;
+    guiding.adjoint_scale.fill(box.roulette ? 1.0f : 0.0f);
     guiding.pixel_estimate = estimate;
     Integrator integrator(*scene, pool);
     SharedFilm film(frame);
-    EXPECT_TRUE(integrator.render_pass({0, kSamples, 1.0}, guiding, film, {cancel, {}}));
+    EXPECT_TRUE(integrator.render_pass({0, kSamples}, guiding, film, {cancel, {}}));
     EXPECT_EQ(integrator.statistics().nonfinite, 0u);
     EXPECT_GT(
         integrator.statistics().stages[static_cast<std::size_t>(Stage::QueryGuidingField)].items,

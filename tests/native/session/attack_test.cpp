@@ -1,5 +1,5 @@
-// Renders whose guide is fed lies: the picture stays finite and unbiased, and not noisier than
-// without a guide. Long form, more than 10 000 steps each: PHAROS_LONG_TESTS=1.
+// Renders whose guide is fed lies: the picture stays finite and unbiased, and its error is at most
+// 1.05 of that without a guide. Long form, 800 passes each: PHAROS_LONG_TESTS=1.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -21,13 +21,13 @@ constexpr float kInfinite = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kWidth = 32;
 constexpr std::uint32_t kHeight = 24;
+constexpr std::uint32_t kSeeds = 4;
 
 using Attack = std::function<void(RadianceRecord&, std::size_t i, std::uint32_t pass)>;
 
 struct AttackCase {
     const char* name;
     Attack attack;
-    bool true_rest = false;  // what stays valid of the records is true: the guide can still learn
 };
 
 std::vector<AttackCase> attacks() {
@@ -35,16 +35,15 @@ std::vector<AttackCase> attacks() {
         return [value](RadianceRecord& r, std::size_t, std::uint32_t) { r.radiance_cos = value; };
     };
     return {
-        {"black", radiance(0.0f), true},
+        {"black", radiance(0.0f)},
         {"faint", radiance(1e-30f)},
         {"bright", radiance(1e30f)},
-        {"infinite", radiance(kInfinite), true},
-        {"not_a_number", radiance(kNan), true},
+        {"infinite", radiance(kInfinite)},
+        {"not_a_number", radiance(kNan)},
         {"firefly",
          [](RadianceRecord& r, std::size_t i, std::uint32_t pass) {
              r.radiance_cos = i == 77 && pass % 8 == 0 ? 1e30f : r.radiance_cos;
-         },
-         true},
+         }},
         {"alternating",
          [](RadianceRecord& r, std::size_t i, std::uint32_t pass) {
              r.radiance_cos = (i + pass) % 2 == 0 ? 1e30f : 1e-30f;
@@ -86,7 +85,8 @@ Attacked render_under(const Attack& attack, SceneDescription description, std::u
     for (std::uint32_t pass = 0; pass < passes; ++pass) {
         const std::uint64_t vertices = integrator.statistics().vertices;
         EXPECT_TRUE(integrator.render_pass(
-            {pass, 1, pass_weight(pass)}, guide.next_pass(), film, {cancel, {}}));
+            {pass, 1, guide.weights().of(pass)}, guide.next_pass(), film, {cancel, {}}));
+        guide.see(film.film, pass + 1);
         RecordBuffer records = integrator.take_records();
         std::ranges::sort(records.radiance, {}, &RadianceRecord::key);
         for (std::size_t i = 0; i < records.radiance.size(); ++i) {
@@ -105,22 +105,25 @@ Attacked render_under(const Attack& attack, SceneDescription description, std::u
 }
 
 std::uint32_t passes_under_attack() {
-    return std::getenv("PHAROS_LONG_TESTS") != nullptr ? 800 : 24;
+    return std::getenv("PHAROS_LONG_TESTS") != nullptr ? 800 : 64;
 }
 
 // The guide of the slides is used everywhere, whatever it has learned.
 TEST(AttackStatistics, PictureKeepsTheClosedForm) {
     SceneDescription description = emitting_box(kWidth, kHeight);
-    description.settings.guiding = GuidingMode::Slides;
     const double exact = exact_radiance(description.settings.max_bounces);
-    for (const AttackCase& c : attacks()) {
-        const Attacked result = render_under(c.attack, description, passes_under_attack());
-        Moments moments;
-        for (std::size_t i = 0; i < result.combined.size(); i += 4) {
-            moments.add(static_cast<double>(result.combined[i]) / exact);
+    for (const GuidingMode mode : {GuidingMode::Slides, GuidingMode::Neural}) {
+        description.settings.guiding = mode;
+        for (const AttackCase& c : attacks()) {
+            SCOPED_TRACE(c.name);
+            const Attacked result = render_under(c.attack, description, passes_under_attack());
+            Moments moments;
+            for (std::size_t i = 0; i < result.combined.size(); i += 4) {
+                moments.add(static_cast<double>(result.combined[i]) / exact);
+            }
+            EXPECT_LT(std::abs(moments.mean - 1.0), 5.0 * std::sqrt(moments.variance()));
+            EXPECT_EQ(result.nonfinite, 0u);
         }
-        EXPECT_LT(std::abs(moments.mean - 1.0), 5.0 * std::sqrt(moments.variance())) << c.name;
-        EXPECT_EQ(result.nonfinite, 0u) << c.name;
     }
 }
 
@@ -134,23 +137,30 @@ double squared_error(const std::vector<float>& picture, const std::vector<float>
     return sum;
 }
 
-// Where what is left of the records is true the guide does no harm; where all of them lie it may be
-// misled, but nothing breaks.
+// Sum over seeds, so that one firefly does not decide.
+double error_under(const Attack& attack, SceneDescription description, const Rendered& reference) {
+    double sum = 0.0;
+    for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+        description.settings.seed = seed;
+        const Attacked result = render_under(attack, description, passes_under_attack());
+        EXPECT_EQ(result.nonfinite, 0u);
+        sum += squared_error(result.combined, reference.combined);
+    }
+    return sum;
+}
+
+// A guide that is fed lies is not used; one that is fed lies and truth may be, when it gains.
 TEST(AttackStatistics, ErrorIsThatOfAnUnguidedRender) {
     SceneDescription description = two_rooms(kWidth, kHeight, 1024);
     const Rendered reference = render(description);
     const auto leave_alone = [](RadianceRecord&, std::size_t, std::uint32_t) {};
-    const std::uint32_t passes = passes_under_attack();
-    const double unguided =
-        squared_error(render_under(leave_alone, description, passes).combined, reference.combined);
+    const double unguided = error_under(leave_alone, description, reference);
     description.settings.guiding = GuidingMode::Neural;
     for (const AttackCase& c : attacks()) {
-        const Attacked result = render_under(c.attack, description, passes);
-        const double ratio = squared_error(result.combined, reference.combined) / unguided;
+        SCOPED_TRACE(c.name);
+        const double ratio = error_under(c.attack, description, reference) / unguided;
         RecordProperty(c.name, std::to_string(ratio));
-        EXPECT_EQ(result.nonfinite, 0u) << c.name;
-        EXPECT_TRUE(std::isfinite(ratio)) << c.name;
-        EXPECT_LT(ratio, c.true_rest ? 1.05 : 1000.0) << c.name;
+        EXPECT_LT(ratio, 1.05);
     }
 }
 

@@ -53,11 +53,11 @@ TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
             GuidingContext guiding;
             guiding.field = &field;
             guiding.fixed_share = 0.5f;
-            guiding.roulette = roulette;
+            guiding.adjoint_scale.fill(roulette ? 1.0f : 0.0f);
             guiding.pixel_estimate = estimate;
             Integrator integrator(*scene, pool);
             SharedFilm film(frame);
-            ASSERT_TRUE(integrator.render_pass({0, 1024, 1.0}, guiding, film, {cancel, {}}));
+            ASSERT_TRUE(integrator.render_pass({0, 1024}, guiding, film, {cancel, {}}));
             std::vector<float> pixels(estimate.size() * 4);
             film.film.read(FilmPass::Combined, pixels);
             double mean = 0.0;
@@ -117,8 +117,8 @@ TEST(Guided, PassesAfterTheGuideAreThoseWithoutIt) {
         Integrator integrator(*scene, pool);
         SharedFilm before(frame);
         SharedFilm film(frame);
-        EXPECT_TRUE(integrator.render_pass({0, 1, 1.0}, first, before, {cancel, {}}));
-        EXPECT_TRUE(integrator.render_pass({1, 1, 1.0}, GuidingContext{}, film, {cancel, {}}));
+        EXPECT_TRUE(integrator.render_pass({0, 1}, first, before, {cancel, {}}));
+        EXPECT_TRUE(integrator.render_pass({1, 1}, GuidingContext{}, film, {cancel, {}}));
         std::vector<float> pixels(std::size_t{frame.crop_width} * frame.crop_height * 4);
         film.film.read(FilmPass::Combined, pixels);
         return pixels;
@@ -143,14 +143,6 @@ TEST(GuidedStatistics, AgreesWithUnguidedAndIsLessNoisy) {
     EXPECT_NEAR(with.mean(1) / without.mean(1), 1.0, 0.03);
     EXPECT_LT(with.progress.noise, without.progress.noise);
     EXPECT_GT(with.progress.guiding.guided_share, 0.1);
-}
-
-TEST(Guided, PassWeightsDependOnTheNumberAlone) {
-    EXPECT_GT(pass_weight(0), 0.0);
-    for (std::uint32_t pass = 0; pass < 100; ++pass) {
-        EXPECT_LE(pass_weight(pass), pass_weight(pass + 1));
-    }
-    EXPECT_EQ(pass_weight(100), 1.0);
 }
 
 }  // namespace
