@@ -19,6 +19,8 @@
 #include "core/check.h"
 #include "core/fp_state.h"
 #include "geometry/instance_surface.h"
+#include "geometry/occluder_cache.h"
+#include "geometry/speed_trial.h"
 
 namespace pharos {
 
@@ -26,6 +28,7 @@ namespace {
 
 constexpr std::uint32_t kCancelPollInterval = 1u << 16;  // vertices or triangles copied in between
 constexpr std::size_t kShortBuild = 100000;              // triangles or instances, tens of ms
+constexpr std::size_t kCacheTrial = 64;                  // rays
 constexpr std::chrono::milliseconds kPollInterval(5);
 constexpr std::chrono::milliseconds kPatience(100);  // with a build that has been told to stop
 
@@ -221,6 +224,26 @@ void intersect_stream(RTCScene scene,
     }
 }
 
+// Buffers of a mesh that is traced in world space; null for an instanced one.
+struct WorldTriangles {
+    const float* vertices = nullptr;
+    const std::uint32_t* indices = nullptr;
+};
+
+void occluded_plain(RTCScene scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded) {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay query;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        occluded[i] = 0;
+        if (traceable(rays[i])) {
+            fill(query, rays[i], kVisibleShadow);
+            rtcOccluded1(scene, &context, &query);
+            occluded[i] = query.tfar < 0.0f ? 1 : 0;  // Embree marks occlusion by tfar = -inf
+        }
+    }
+}
+
 // Everything a build makes. Shared with the thread that runs a long build.
 struct Structure {
     Monitor monitor;  // outlives the device, whose end it still counts
@@ -316,15 +339,66 @@ struct Accelerator::Impl {
     std::shared_ptr<Structure> structure = std::make_shared<Structure>();
     RTCScene scene = nullptr;  // the structure's
     Bounds3 bounds;
+    std::vector<WorldTriangles> world;  // by instance
+    SpeedTrial occluder_trial;          // with the cache of occluders or without
 
     void build(std::span<const Mesh> meshes,
                std::span<const Instance> instances,
                const CancelFlag& cancel);
     void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility) const;
+    void occluded_cached(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
+    void remember(const RTCHit& hit, OccluderCache& cache) const;
     [[nodiscard]] RTCScene object_scene(const Mesh& mesh,
                                         std::uint32_t index,
                                         const CancelFlag& cancel) const;
 };
+
+// A cache of its own for each call: neighbouring pixels share their occluders. Where it stops less
+// than half of the rays it is left alone.
+void Accelerator::Impl::occluded_cached(std::span<const Ray> rays,
+                                        std::span<std::uint8_t> occluded) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    OccluderCache cache;
+    std::size_t asked = 0;
+    std::size_t stopped = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        occluded[i] = 0;
+        if (!traceable(rays[i])) {
+            continue;
+        }
+        if (asked >= kCacheTrial && 2 * stopped < asked) {
+            occluded_plain(scene, rays.subspan(i), occluded.subspan(i));
+            return;
+        }
+        ++asked;
+        if (cache.stops(rays[i])) {
+            ++stopped;
+            occluded[i] = 1;
+            continue;
+        }
+        RTCRayHit query;
+        fill(query, rays[i], kVisibleShadow);
+        rtcIntersect1(scene, &context, &query);
+        if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+            occluded[i] = 1;
+            remember(query.hit, cache);
+        }
+    }
+}
+
+// Only triangles in world space: those of instances would have to be transformed each time.
+void Accelerator::Impl::remember(const RTCHit& hit, OccluderCache& cache) const {
+    const WorldTriangles& mesh = world[hit.geomID];
+    if (hit.instID[0] != RTC_INVALID_GEOMETRY_ID || mesh.vertices == nullptr) {
+        return;
+    }
+    const auto corner = [&](std::size_t k) {
+        const float* p = mesh.vertices + 3 * std::size_t{mesh.indices[3 * hit.primID + k]};
+        return Vec3(p[0], p[1], p[2]);
+    };
+    cache.insert(corner(0), corner(1), corner(2));
+}
 
 // The scene of a shared mesh, built when it is first met.
 RTCScene Accelerator::Impl::object_scene(const Mesh& mesh,
@@ -359,6 +433,7 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
     RTCDevice device = structure->device.get();
     rtcSetDeviceMemoryMonitorFunction(device, on_memory, &structure->monitor);
     structure->objects.resize(meshes.size());
+    world.resize(instances.size());
     structure->scene = make_scene(device, structure->monitor);
     scene = structure->scene.get();
     const std::vector<std::uint32_t> uses = count_mesh_uses(meshes.size(), instances);
@@ -371,8 +446,13 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
             continue;
         }
         if (uses[instance.mesh] == 1) {
-            attach(
-                i, make_triangles(device, mesh, &instance.to_world, cancel), instance.visibility);
+            const GeometryPtr triangles = make_triangles(device, mesh, &instance.to_world, cancel);
+            const auto data = [&](RTCBufferType type) {
+                return rtcGetGeometryBufferData(triangles.get(), type, 0);
+            };
+            world[i] = {static_cast<const float*>(data(RTC_BUFFER_TYPE_VERTEX)),
+                        static_cast<const std::uint32_t*>(data(RTC_BUFFER_TYPE_INDEX))};
+            attach(i, triangles, instance.visibility);
             primitives += mesh.triangles.size();
         } else {
             RTCScene object = object_scene(mesh, instance.mesh, cancel);
@@ -431,19 +511,13 @@ void Accelerator::intersect(std::span<const Ray> rays,
 
 void Accelerator::occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
     DCHECK(occluded.size() >= rays.size());
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    RTCScene scene = impl_->scene;
-    RTCRay query;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        occluded[i] = 0;
-        if (!traceable(rays[i])) {
-            continue;
+    impl_->occluder_trial.run(rays.size(), [&](bool cached) {
+        if (cached) {
+            impl_->occluded_cached(rays, occluded);
+        } else {
+            occluded_plain(impl_->scene, rays, occluded);
         }
-        fill(query, rays[i], kVisibleShadow);
-        rtcOccluded1(scene, &context, &query);
-        occluded[i] = query.tfar < 0.0f ? 1 : 0;  // Embree marks occlusion by tfar = -inf
-    }
+    });
 }
 
 Bounds3 Accelerator::bounds() const {
