@@ -1,6 +1,8 @@
 #include "lights/emissive_triangles.h"
 
+#include <algorithm>
 #include <unordered_map>
+#include <utility>
 
 #include "core/color.h"
 #include "sampling/warps.h"
@@ -13,6 +15,8 @@ namespace {
 constexpr float kFlatCosine = 0.999f;
 // Facing tables look from infinity: they hold from this many bounding radii on.
 constexpr float kFacingDistance = 2.5f;
+constexpr std::size_t kMaxFacingGroups = 64;  // memory: beyond, the choice among groups must do
+constexpr std::uint32_t kClusterTriangles = 16;
 
 Vec3 unit_normal(const Vec3& e1, const Vec3& e2) {
     return normalize_or(glm::cross(glm::normalize(e1), glm::normalize(e2)), Vec3(0.0f));
@@ -48,9 +52,12 @@ std::uint32_t material_of(const Mesh& mesh, const Instance& instance, std::uint3
 
 EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input) {
     collect(input);
+    split_groups(input);
     for (Group& group : groups_) {
         finish_group(group);
-        add_facing_tables(input, group);
+        if (groups_.size() <= kMaxFacingGroups) {
+            add_facing_tables(group);
+        }
     }
     instance_first_.assign(input.instances.size(), kNone);
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
@@ -133,23 +140,77 @@ void EmissiveTriangles::finish_group(Group& group) {
     group.choice = AliasTable(weights);
 }
 
-void EmissiveTriangles::add_facing_tables(const LightSamplerInput& input, Group& group) {
+bool EmissiveTriangles::is_closed_group(const LightSamplerInput& input, const Group& group) const {
     if (group.count < 4 || group.count > FacingTables::kMaxTriangles) {
-        return;
+        return false;
     }
     std::vector<UVec3> corners;
+    for (const Triangle& t : members(group)) {
+        corners.push_back(input.meshes[input.instances[t.instance].mesh].triangles[t.triangle]);
+    }
+    return is_closed(corners);
+}
+
+// Closed groups stay whole as long as facing tables serve them.
+void EmissiveTriangles::split_groups(const LightSamplerInput& input) {
+    const std::vector<Group> whole = std::move(groups_);
+    groups_.clear();
+    for (const Group& group : whole) {
+        const bool closed = is_closed_group(input, group);
+        if (group.count <= kClusterTriangles || (closed && whole.size() <= kMaxFacingGroups)) {
+            groups_.push_back(group);
+            groups_.back().closed = closed;
+        } else {
+            split_range(group.first, group.count);
+        }
+    }
+    for (std::uint32_t index = 0; index < groups_.size(); ++index) {
+        for (std::uint32_t i = 0; i < groups_[index].count; ++i) {
+            triangles_[groups_[index].first + i].group = index;
+        }
+    }
+}
+
+// Halves along the longest axis until a cluster is left; reorders the triangles.
+void EmissiveTriangles::split_range(std::uint32_t first, std::uint32_t count) {
+    if (count <= kClusterTriangles) {
+        Group cluster;
+        cluster.first = first;
+        cluster.count = count;
+        groups_.push_back(std::move(cluster));
+        return;
+    }
+    const auto begin = triangles_.begin() + first;
+    const auto center = [](const Triangle& t) { return 3.0f * t.p0 + t.e1 + t.e2; };
+    Bounds3 box;
+    for (auto t = begin; t != begin + count; ++t) {
+        box.extend(center(*t));
+    }
+    const Vec3 e = box.extent();
+    const int axis = e.x >= e.y && e.x >= e.z ? 0 : (e.y >= e.z ? 1 : 2);
+    const std::uint32_t half = count / 2;
+    // Ties by the triangles' own numbers: the same clusters with every library.
+    std::nth_element(begin, begin + half, begin + count, [&](const Triangle& a, const Triangle& b) {
+        const float x = center(a)[axis];
+        const float y = center(b)[axis];
+        return x != y ? x < y
+                      : std::pair(a.instance, a.triangle) < std::pair(b.instance, b.triangle);
+    });
+    split_range(first, half);
+    split_range(first + half, count - half);
+}
+
+void EmissiveTriangles::add_facing_tables(Group& group) {
+    if (!group.closed) {
+        return;
+    }
     std::vector<Vec3> normals;
     std::vector<float> weights;
     double volume = 0.0;  // six times, signed: its sign says which way is out
     for (const Triangle& t : members(group)) {
-        const Mesh& mesh = input.meshes[input.instances[t.instance].mesh];
-        corners.push_back(mesh.triangles[t.triangle]);
         normals.push_back(unit_normal(t.e1, t.e2));
         weights.push_back(t.weight);
         volume += static_cast<double>(glm::dot(t.p0 - group.center, glm::cross(t.e1, t.e2)));
-    }
-    if (!is_closed(corners)) {
-        return;
     }
     for (Vec3& normal : normals) {
         normal = volume < 0.0 ? -normal : normal;
@@ -173,7 +234,7 @@ LightBound EmissiveTriangles::bound(std::uint32_t index) const {
     bound.strength = group.power;
     if (is_zero(group.normal)) {
         // The mean projected area of a sheet is half of it, of a closed surface a quarter.
-        bound.strength *= group.facing.empty() ? 0.5f : 0.25f;
+        bound.strength *= group.closed ? 0.25f : 0.5f;
     } else {
         bound.orientation = EmitterOrientation::TwoSided;
         bound.axis = group.normal;

@@ -1,4 +1,5 @@
 // The emissive triangles of a scene in world space, in groups of one instance and material each.
+// Large groups are split into clusters of neighbours, so that the nearest of them can be chosen.
 //
 // Within a group a triangle is chosen in proportion to area times estimated radiance (closed
 // emitters seen from some distance: times the cosine towards the receiver, too), its point
@@ -12,8 +13,8 @@
 
 #include "core/math.h"
 #include "lights/facing_tables.h"
+#include "lights/light_bound.h"
 #include "lights/light_sampler.h"
-#include "lights/light_selection.h"
 #include "sampling/alias_table.h"
 
 namespace pharos {
@@ -79,12 +80,16 @@ class EmissiveTriangles {
         Vec3 center;
         float facing_distance2 = kInfinity;  // from which on the facing tables hold
         AliasTable choice;
-        FacingTables facing;  // of a closed group
+        bool closed = false;
+        FacingTables facing;  // of a closed group, if there are not too many
     };
 
     void collect(const LightSamplerInput& input);
+    void split_groups(const LightSamplerInput& input);
+    void split_range(std::uint32_t first, std::uint32_t count);
     void finish_group(Group& group);
-    void add_facing_tables(const LightSamplerInput& input, Group& group);
+    [[nodiscard]] bool is_closed_group(const LightSamplerInput& input, const Group& group) const;
+    void add_facing_tables(Group& group);
 
     [[nodiscard]] std::span<const Triangle> members(const Group& group) const {
         return std::span(triangles_).subspan(group.first, group.count);

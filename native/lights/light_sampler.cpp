@@ -4,6 +4,7 @@
 #include "lights/emissive_triangles.h"
 #include "lights/lamp.h"
 #include "lights/lamp_tree.h"
+#include "lights/light_bound.h"
 #include "lights/light_selection.h"
 
 namespace pharos {
@@ -100,9 +101,7 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
         impl_->environment = input.environment;
         bounds.push_back(bound_environment(*input.environment));
     }
-    const Bounds3& scene = input.scene_bounds;
-    const float radius = scene.empty() ? 1.0f : 0.5f * glm::length(scene.extent());
-    impl_->selection = LightSelection(bounds, radius);
+    impl_->selection = LightSelection(bounds);
     impl_->tree = LampTree(impl_->lamps);
 }
 

@@ -1,6 +1,6 @@
 // All lights of a scene behind one interface: lamps, emissive triangles, world. Chooses a light for
-// a point (few lights: by an estimate of each one's contribution there; many: by power), samples
-// it, and returns the density of the same choice for a light that a ray met by chance.
+// a point (by an estimate of each one's contribution there, of many along a tree), samples it, and
+// returns the density of the same choice for a light that a ray met by chance.
 //
 // Built once per scene; const and thread-safe afterwards. Order is that of the description.
 #pragma once
@@ -33,7 +33,6 @@ struct LightSamplerInput {
     std::span<const Mesh> meshes;
     std::span<const Instance> instances;
     const EnvironmentLight* environment = nullptr;  // null or black: no world light
-    Bounds3 scene_bounds;
 };
 
 // A sample on an emissive triangle or the world still needs its radiance from a node program.

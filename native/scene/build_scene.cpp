@@ -245,7 +245,6 @@ void SceneBuild::make_lights() {
     input.meshes = scene_->description.meshes;
     input.instances = scene_->instances;
     input.environment = scene_->environment.get();
-    input.scene_bounds = scene_->bounds;
     scene_->lights = std::make_unique<LightSampler>(input);
 }
 

@@ -44,8 +44,6 @@ struct TriangleScene {
         input.triangles = emitters;
         input.meshes = meshes;
         input.instances = instances;
-        input.scene_bounds.extend(Vec3(-5.0f));
-        input.scene_bounds.extend(Vec3(5.0f));
         return LightSampler(input);
     }
 

@@ -36,8 +36,6 @@ inline LightSampler make_sampler(std::span<const LightDescription> lamps,
     input.lamps = lamps;
     input.blender_version = version;
     input.environment = environment;
-    input.scene_bounds.extend(Vec3(-5.0f));
-    input.scene_bounds.extend(Vec3(5.0f));
     return LightSampler(input);
 }
 

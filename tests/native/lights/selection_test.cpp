@@ -35,7 +35,7 @@ std::vector<LightDescription> random_lamps(int count, std::uint64_t seed) {
     return lamps;
 }
 
-// Chance hits have exactly the sampler's density, with few lamps (estimates) and many (strengths).
+// Chance hits have exactly the sampler's density, with few lamps and along the tree.
 TEST(Selection, ChanceHitDensityIncludesTheChoice) {
     for (const int count : {2, 9, 32, 33, 400}) {
         for (const std::uint32_t version : {304u, 405u}) {
@@ -78,7 +78,7 @@ TEST(Selection, SumOverLampsIsUnbiased) {
                 expected += test::sampled_radiance(make_sampler(lamp, 405), context, 100);
             }
             const double together = test::sampled_radiance(all, context, 700);
-            EXPECT_NEAR(together / expected, 1.0, count > 32 ? 0.03 : 0.01) << count;
+            EXPECT_NEAR(together / expected, 1.0, count > 32 ? 0.02 : 0.01) << count;
         }
     }
 }
@@ -117,7 +117,7 @@ TEST(Selection, BoundsAreAboveEveryContribution) {
             LightBound world;
             world.distance = EmitterDistance::Ambient;
             world.strength = 1e-6f;
-            const LightSelection selection(std::array{bound_lamp(*lamp), world}, 5.0f);
+            const LightSelection selection(std::array{bound_lamp(*lamp), world});
             for (int i = 0; i < 300; ++i) {
                 const LightSampleContext context{
                     random.uniform3() * 8.0f - 4.0f, random.direction(), false};
@@ -129,6 +129,96 @@ TEST(Selection, BoundsAreAboveEveryContribution) {
         }
     }
     EXPECT_GT(lit, 3000);
+}
+
+// Local and distant lights of all shapes and the world.
+std::vector<LightBound> random_bounds(int count) {
+    std::vector<LightBound> bounds;
+    for (LightDescription& d : random_lamps(count, 31)) {
+        if (bounds.size() % 50 == 7) {
+            d.type = LightType::Sun;
+        }
+        if (const auto lamp = make_lamp(d, 405, 0)) {
+            bounds.push_back(bound_lamp(*lamp));
+        }
+    }
+    LightBound world;
+    world.distance = EmitterDistance::Ambient;
+    world.center = Vec3(0, 0, 1);
+    world.strength = 0.3f;
+    bounds.push_back(world);
+    return bounds;
+}
+
+TEST(LightTree, ProbabilitiesAreThoseOfTheChoiceAndAddUp) {
+    Random random(9);
+    for (const int count : {40, 600, 5000}) {
+        const std::vector<LightBound> bounds = random_bounds(count);
+        const LightTree tree(bounds);
+        for (int i = 0; i < 6; ++i) {
+            const LightSampleContext context{
+                random.uniform3() * 8.0f - 4.0f, random.direction(), i % 2 == 0};
+            double sum = 0.0;
+            for (std::uint32_t light = 0; light < bounds.size(); ++light) {
+                sum += static_cast<double>(tree.pmf(context, light));
+            }
+            // Less where a node promised light that none of its children has.
+            EXPECT_LT(sum, 1.0 + 1e-4);
+            EXPECT_GT(sum, 0.9);
+            for (int k = 0; k < 200; ++k) {
+                const auto choice = tree.choose(context, random.uniform());
+                if (choice) {
+                    EXPECT_NEAR(choice->pmf / tree.pmf(context, choice->group), 1.0f, 1e-4f);
+                    EXPECT_TRUE(choice->u >= 0.0 && choice->u < 1.0);
+                }
+            }
+        }
+    }
+}
+
+// Whatever a light brings, the nodes above it let it be found.
+TEST(LightTree, NeverZeroWhereALightBringsSome) {
+    Random random(15);
+    const std::vector<LightBound> bounds = random_bounds(700);
+    const LightTree tree(bounds);
+    int lit = 0;
+    for (int i = 0; i < 300; ++i) {
+        const LightSampleContext context{
+            random.uniform3() * 12.0f - 6.0f, random.direction(), i % 2 == 0};
+        for (std::uint32_t light = 0; light < bounds.size(); ++light) {
+            LightColumns<8> alone;
+            alone.set(0, bounds[light]);
+            LightColumns<8>::Column weights;
+            if (alone.estimate(context, 1, weights) > 0.0f) {
+                ++lit;
+                EXPECT_GT(tree.pmf(context, light), 0.0f) << light;
+            }
+        }
+    }
+    EXPECT_GT(lit, 50000);
+}
+
+// Against a choice by strength alone: a street of lamps seen from beneath one of them.
+TEST(LightTree, PrefersWhatIsNear) {
+    std::vector<LightBound> street(10000);
+    for (std::size_t i = 0; i < street.size(); ++i) {
+        street[i].center = Vec3(3.0f * static_cast<float>(i), 0.0f, 4.0f);
+        street[i].strength = 1.0f;
+    }
+    const LightTree tree(street);
+    const LightSampleContext below{Vec3(15000.0f, 0.0f, 0.0f), Vec3(0, 0, 1), false};
+    double second_moment = 0.0;  // of the irradiance estimate, over that of the best choice
+    double irradiance = 0.0;
+    double uniform = 0.0;
+    for (std::uint32_t light = 0; light < street.size(); ++light) {
+        const Vec3 to = street[light].center - below.p;
+        const auto brings = static_cast<double>(to.z / std::pow(glm::length(to), 3.0f));
+        irradiance += brings;
+        second_moment += brings * brings / static_cast<double>(tree.pmf(below, light));
+        uniform += brings * brings * static_cast<double>(street.size());
+    }
+    EXPECT_LT(second_moment / (irradiance * irradiance), 1.6);
+    EXPECT_GT(uniform / (irradiance * irradiance), 1000.0);
 }
 
 TEST(Selection, TreeFindsWhatBruteForceFinds) {

@@ -1,0 +1,218 @@
+#include "lights/light_tree.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace pharos {
+
+namespace {
+
+constexpr std::size_t kBins = 16;
+
+using Order = std::span<std::uint32_t>;
+
+Bounds3 box_of(std::span<const LightBound> bounds, Order order) {
+    Bounds3 box;
+    for (const std::uint32_t i : order) {
+        box.extend(bounds[i].center);
+    }
+    return box;
+}
+
+float surface(const Bounds3& box) {
+    const Vec3 e = box.extent();
+    return box.empty() ? 0.0f : e.x * e.y + e.y * e.z + e.z * e.x + 1e-20f;
+}
+
+// Bins of centers along the longest axis.
+struct Binning {
+    int axis = 0;
+    float lower = 0.0f;
+    float scale = 0.0f;
+
+    explicit Binning(const Bounds3& box) {
+        const Vec3 e = box.extent();
+        axis = e.x >= e.y && e.x >= e.z ? 0 : (e.y >= e.z ? 1 : 2);
+        lower = box.lower[axis];
+        scale = e[axis] > 0.0f ? static_cast<float>(kBins) / e[axis] : 0.0f;
+    }
+
+    [[nodiscard]] std::size_t of(const LightBound& bound) const {
+        const float x = (bound.center[axis] - lower) * scale;
+        return std::min(static_cast<std::size_t>(std::max(x, 0.0f)), kBins - 1);
+    }
+};
+
+// The last bin of the left part, where strength times surface of both parts is least.
+std::size_t best_split(std::span<const LightBound> bounds, Order order, const Binning& binning) {
+    std::array<Bounds3, kBins> box;
+    std::array<float, kBins> strength{};
+    for (const std::uint32_t i : order) {
+        const std::size_t bin = binning.of(bounds[i]);
+        box[bin].extend(bounds[i].center);
+        strength[bin] += bounds[i].strength;
+    }
+    std::array<float, kBins> right_cost{};
+    Bounds3 all;
+    float sum = 0.0f;
+    for (std::size_t bin = kBins - 1; bin > 0; --bin) {
+        all.extend(box[bin]);
+        sum += strength[bin];
+        right_cost[bin] = surface(all) * sum;
+    }
+    std::size_t best = 0;
+    float least = kInfinity;
+    all = Bounds3();
+    sum = 0.0f;
+    for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
+        all.extend(box[bin]);
+        sum += strength[bin];
+        const float cost = surface(all) * sum + right_cost[bin + 1];
+        if (cost < least) {
+            least = cost;
+            best = bin;
+        }
+    }
+    return best;
+}
+
+// Reorders; both parts have one light at least.
+std::size_t split(std::span<const LightBound> bounds, Order order) {
+    const Binning binning(box_of(bounds, order));
+    if (binning.scale > 0.0f && binning.scale < kInfinity) {
+        const std::size_t last = best_split(bounds, order, binning);
+        const auto middle = std::stable_partition(order.begin(), order.end(), [&](std::uint32_t i) {
+            return binning.of(bounds[i]) <= last;
+        });
+        const auto left = static_cast<std::size_t>(middle - order.begin());
+        if (left > 0 && left < order.size()) {
+            return left;
+        }
+    }
+    return order.size() / 2;
+}
+
+}  // namespace
+
+LightChoice choose_in_proportion(std::span<const float> weights, float sum, double u) {
+    double rest = u * static_cast<double>(sum);
+    LightChoice choice;
+    for (std::uint32_t i = 0; i < weights.size(); ++i) {
+        const auto weight = static_cast<double>(weights[i]);
+        if (weight > 0.0) {
+            // Rounding may run past the end: the last possible entry is kept then.
+            choice = {i, weights[i] / sum, std::min(rest / weight, 0x1.fffffffffffffp-1)};
+            if (rest < weight) {
+                break;
+            }
+        }
+        rest -= weight;
+    }
+    return choice;
+}
+
+LightTree::LightTree(std::span<const LightBound> bounds) : slot_(bounds.size()) {
+    // Distances mean nothing to distant lights: the two kinds meet at the root only.
+    std::vector<std::uint32_t> order(bounds.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto middle = std::stable_partition(order.begin(), order.end(), [&](std::uint32_t i) {
+        return bounds[i].distance == EmitterDistance::Local;
+    });
+    const auto local = static_cast<std::size_t>(middle - order.begin());
+    const std::array<Order, 2> parts = {Order(order).first(local), Order(order).subspan(local)};
+    if (parts[0].empty() || parts[1].empty()) {
+        build(bounds, order, {});
+        return;
+    }
+    nodes_.emplace_back();
+    for (std::uint32_t entry = 0; entry < 2; ++entry) {
+        std::vector<LightBound> members;
+        for (const std::uint32_t i : parts[entry]) {
+            members.push_back(bounds[i]);
+        }
+        const std::uint32_t child = build(bounds, parts[entry], {kRoot, entry});
+        nodes_[kRoot].children[entry] = {child, false};
+        nodes_[kRoot].columns.set(entry, merge_bounds(members));
+    }
+    nodes_[kRoot].count = 2;
+}
+
+// Returns the index of the new node.
+std::uint32_t LightTree::build(std::span<const LightBound> bounds, Order order, Slot parent) {
+    const auto index = static_cast<std::uint32_t>(nodes_.size());
+    nodes_.emplace_back();
+    nodes_[index].parent = parent;
+    std::vector<Order> parts{order};
+    while (parts.size() < kWidth) {
+        const auto largest = std::ranges::max_element(parts, {}, &Order::size);
+        if (largest->size() < 2) {
+            break;
+        }
+        const Order whole = *largest;
+        const std::size_t left = split(bounds, whole);
+        *largest = whole.first(left);
+        parts.push_back(whole.subspan(left));
+    }
+    nodes_[index].count = static_cast<std::uint32_t>(parts.size());
+    std::vector<LightBound> members;
+    for (std::uint32_t entry = 0; entry < parts.size(); ++entry) {
+        const Order part = parts[entry];
+        if (part.size() == 1) {
+            nodes_[index].children[entry] = {part[0], true};
+            nodes_[index].columns.set(entry, bounds[part[0]]);
+            slot_[part[0]] = {index, entry};
+            continue;
+        }
+        members.clear();
+        for (const std::uint32_t i : part) {
+            members.push_back(bounds[i]);
+        }
+        nodes_[index].columns.set(entry, merge_bounds(members));
+        const std::uint32_t child = build(bounds, part, {index, entry});
+        nodes_[index].children[entry] = {child, false};
+    }
+    return index;
+}
+
+std::optional<LightChoice> LightTree::choose(const LightSampleContext& context, double u) const {
+    LightChoice choice{0, 1.0f, u};
+    std::uint32_t index = kRoot;
+    while (true) {
+        const Node& node = nodes_[index];
+        LightColumns<kWidth>::Column weights;
+        const float sum = node.columns.estimate(context, node.count, weights);
+        if (!(sum > 0.0f && sum < kInfinity)) {
+            return std::nullopt;
+        }
+        const LightChoice step =
+            choose_in_proportion(std::span(weights).first(node.count), sum, choice.u);
+        choice.pmf *= step.pmf;
+        choice.u = step.u;
+        const Child& child = node.children[step.group];
+        if (child.leaf) {
+            choice.group = child.index;
+            return choice;
+        }
+        index = child.index;
+    }
+}
+
+float LightTree::pmf(const LightSampleContext& context, std::uint32_t light) const {
+    Slot at = slot_[light];
+    float pmf = 1.0f;
+    while (true) {
+        const Node& node = nodes_[at.node];
+        LightColumns<kWidth>::Column weights;
+        const float sum = node.columns.estimate(context, node.count, weights);
+        if (!(sum > 0.0f && sum < kInfinity)) {
+            return 0.0f;
+        }
+        pmf *= weights[at.entry] / sum;
+        if (at.node == kRoot) {
+            return pmf;
+        }
+        at = node.parent;
+    }
+}
+
+}  // namespace pharos
