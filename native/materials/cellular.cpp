@@ -268,15 +268,6 @@ template <std::size_t D>
     }
 }
 
-template <std::size_t D>
-[[nodiscard]] NoisePoint<D> scaled(const NoisePoint<D>& p, float factor) {
-    NoisePoint<D> out = p;
-    for (float& x : out) {
-        x *= factor;
-    }
-    return out;
-}
-
 // `a` moved towards a + b by the share.
 template <std::size_t D>
 void add_share(

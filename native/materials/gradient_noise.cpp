@@ -8,15 +8,6 @@ namespace pharos::detail {
 
 namespace {
 
-template <std::size_t D>
-[[nodiscard]] NoisePoint<D> scaled(const NoisePoint<D>& p, float factor) {
-    NoisePoint<D> out = p;
-    for (float& x : out) {
-        x *= factor;
-    }
-    return out;
-}
-
 // One point on its way through the octaves. `whole` full ones and a share of one more.
 template <std::size_t D>
 class Octaves {

@@ -18,6 +18,15 @@ namespace pharos::detail {
 template <std::size_t D>
 using NoisePoint = std::array<float, D>;
 
+template <std::size_t D>
+[[nodiscard]] NoisePoint<D> scaled(const NoisePoint<D>& p, float factor) {
+    NoisePoint<D> out = p;
+    for (float& x : out) {
+        x *= factor;
+    }
+    return out;
+}
+
 namespace noise {
 
 [[nodiscard]] inline float negate_if(float x, std::uint32_t bit) {
