@@ -33,8 +33,8 @@ constexpr std::uint32_t kHardPassPart = 16;
 constexpr std::uint32_t kEasyPassPart = 4;
 
 // The adjoint must have been learned before paths are killed by it: after so many paths.
-constexpr std::uint64_t kPathsBeforeRoulette = 1u << 18;
-constexpr std::uint32_t kMinPassesBeforeRoulette = 4;
+constexpr std::uint64_t kPathsBeforeRoulette = 1u << 17;
+constexpr std::uint32_t kMinPassesBeforeRoulette = 2;
 constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
 // and its sum over all records must be that of what arrived within this factor.
 constexpr double kMaxCalibration = 4.0;

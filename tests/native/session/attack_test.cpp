@@ -104,8 +104,8 @@ Attacked render_under(const Attack& attack, SceneDescription description, std::u
     return result;
 }
 
-std::uint32_t passes_under_attack() {
-    return std::getenv("PHAROS_LONG_TESTS") != nullptr ? 800 : 64;
+std::uint32_t passes_under_attack(std::uint32_t usual) {
+    return std::getenv("PHAROS_LONG_TESTS") != nullptr ? 800 : usual;
 }
 
 // The guide of the slides is used everywhere, whatever it has learned.
@@ -116,7 +116,7 @@ TEST(AttackStatistics, PictureKeepsTheClosedForm) {
         description.settings.guiding = mode;
         for (const AttackCase& c : attacks()) {
             SCOPED_TRACE(c.name);
-            const Attacked result = render_under(c.attack, description, passes_under_attack());
+            const Attacked result = render_under(c.attack, description, passes_under_attack(24));
             Moments moments;
             for (std::size_t i = 0; i < result.combined.size(); i += 4) {
                 moments.add(static_cast<double>(result.combined[i]) / exact);
@@ -142,7 +142,7 @@ double error_under(const Attack& attack, SceneDescription description, const Ren
     double sum = 0.0;
     for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
         description.settings.seed = seed;
-        const Attacked result = render_under(attack, description, passes_under_attack());
+        const Attacked result = render_under(attack, description, passes_under_attack(64));
         EXPECT_EQ(result.nonfinite, 0u);
         sum += squared_error(result.combined, reference.combined);
     }
