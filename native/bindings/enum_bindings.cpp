@@ -92,7 +92,8 @@ void bind_scene_enums(py::module_& m) {
                              "GuidingMode",
                              {{"Off", GuidingMode::Off},
                               {"Neural", GuidingMode::Neural},
-                              {"Slides", GuidingMode::Slides}});
+                              {"Slides", GuidingMode::Slides},
+                              {"SlidesPosition", GuidingMode::SlidesPosition}});
     m.attr("VISIBLE_CAMERA") = static_cast<unsigned>(kVisibleCamera);
     m.attr("VISIBLE_DIFFUSE") = static_cast<unsigned>(kVisibleDiffuse);
     m.attr("VISIBLE_GLOSSY") = static_cast<unsigned>(kVisibleGlossy);

@@ -14,7 +14,7 @@ constexpr const char* kUsage =
     "  --samples N        samples per pixel (default: the file's)\n"
     "  --seed N           seed (default: the file's)\n"
     "  --threads N        threads (default: one per core)\n"
-    "  --guiding MODE     off, neural or slides (default: the file's)\n"
+    "  --guiding MODE     off, neural, slides, slides-position (default: the file's)\n"
     "  --nee on|off       next-event estimation (default: the file's)\n"
     "  --time-limit S     stop after S seconds\n"
     "  --passes A,B       passes beside the basic ones: names, all, guide or none (default: the "

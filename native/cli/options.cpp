@@ -46,7 +46,10 @@ GuidingMode parse_guiding(const std::string& text) {
     if (lower == "slides") {
         return GuidingMode::Slides;
     }
-    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides");
+    if (lower == "slides-position") {
+        return GuidingMode::SlidesPosition;
+    }
+    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides, slides-position");
 }
 
 std::uint32_t parse_passes(const std::string& text) {

@@ -42,7 +42,12 @@ struct WorldDescription {
     std::uint32_t visibility = kVisibleAll;
 };
 
-enum class GuidingMode : std::uint32_t { Off, Neural, Slides };
+enum class GuidingMode : std::uint32_t {
+    Off,
+    Neural,
+    Slides,         // the thesis' model: one lobe
+    SlidesPosition  // of the position alone, for comparison
+};
 
 struct RenderSettings {
     std::uint32_t samples = 128;

@@ -13,6 +13,7 @@
 #include "integrator/integrator.h"
 #include "sampling/sampler.h"
 #include "scene/scene.h"
+#include "session/guide_controller.h"
 
 namespace pharos {
 
@@ -102,7 +103,7 @@ void draw_truth(const Scene& scene,
                 Integrator& integrator,
                 FieldProbe& probe) {
     const bool both_sides = scene.materials[surface.material].transmits;
-    const bool cosine = scene.description.settings.guiding != GuidingMode::Slides;
+    const bool cosine = guiding_config(scene.description.settings.guiding).target_cosine;
     const std::size_t cells = probe.truth.size();
     std::vector<Ray> rays(cells);
     std::vector<float> weights(cells);
@@ -190,8 +191,7 @@ FieldProbe probe_field(SceneDescription description,
     }
     const auto scene = build_scene(std::move(description), never, report);
     const SurfaceInteraction surface = first_hit(*scene, settings);
-    const bool slides = scene->description.settings.guiding == GuidingMode::Slides;
-    GuidingField field(slides ? GuidingConfig::slides() : GuidingConfig::neural(), scene->bounds);
+    GuidingField field(guiding_config(scene->description.settings.guiding), scene->bounds);
     if (!settings.weights.empty()) {
         field.load(settings.weights);
     }

@@ -41,18 +41,29 @@ constexpr double kMaxCalibration = 4.0;
 
 }  // namespace
 
+GuidingConfig guiding_config(GuidingMode mode) {
+    switch (mode) {
+        case GuidingMode::Off:
+        case GuidingMode::Neural:
+            break;
+        case GuidingMode::Slides:
+            return GuidingConfig::slides();
+        case GuidingMode::SlidesPosition:
+            return GuidingConfig::slides(false);
+    }
+    return GuidingConfig::neural();
+}
+
 GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels)
-    : mode_(mode),
-      enabled_(mode != GuidingMode::Off && !scene_box.empty()),
+    : enabled_(mode != GuidingMode::Off && !scene_box.empty()),
       pixels_(pixels),
       record_probability_(pixels < 65536 ? 1.0f : kFirstRecordProbability) {
     status_.enabled = enabled_;
     if (!enabled_) {
         return;
     }
-    const bool slides = mode == GuidingMode::Slides;
-    field_.emplace(slides ? GuidingConfig::slides() : GuidingConfig::neural(), scene_box);
-    if (!slides) {
+    field_.emplace(guiding_config(mode), scene_box);
+    if (mode == GuidingMode::Neural) {
         selection_.emplace(scene_box);
     }
 }

@@ -19,6 +19,9 @@
 
 namespace pharos {
 
+// How the field of a mode is made; of Off, that of Neural.
+[[nodiscard]] GuidingConfig guiding_config(GuidingMode mode);
+
 class GuideController {
   public:
     GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels);
@@ -49,7 +52,6 @@ class GuideController {
     void calibrate(const std::array<double, 2>& calibration);
     void judge_hardness(const SelectionStatistics& selected);
 
-    GuidingMode mode_;
     bool enabled_;
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;

@@ -49,6 +49,7 @@ def all_engines():
         Engine("pharos", "pharos", {"guiding": "NEURAL"}, "pharos"),
         Engine("pharos-off", "pharos", {"guiding": "OFF"}, "pharos"),
         Engine("pharos-slides", "pharos", {"guiding": "SLIDES"}, "pharos"),
+        Engine("pharos-slides-position", "pharos", {"guiding": "SLIDES-POSITION"}, "pharos"),
         Engine("cycles", "cycles", {"guiding": False}, "cycles"),
         Engine("cycles-guided", "cycles", {"guiding": True}, "cycles"),
     )}
