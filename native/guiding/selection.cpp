@@ -41,6 +41,9 @@ constexpr double kMinNoiseFactor = 0.2;  // early variances are those of the pix
 // Nearly nothing is on: the whole machinery closes (with fewer where it is noisy, likewise).
 constexpr double kGateShare = 0.12;
 constexpr std::uint32_t kGatePasses = 9;  // after so many judged passes
+// Sooner in a quiet picture where the guide would do harm.
+constexpr std::uint32_t kHopelessPasses = 3;
+constexpr double kHopelessShare = 0.02;
 constexpr std::uint32_t kProbeEvery = 64;
 constexpr std::uint32_t kProbePasses = 2;
 
@@ -419,7 +422,12 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
 
 // Closes when nearly nothing is on; opens again for two passes in 64 that it is told of.
 void GuideSelection::Impl::update_gate(const SelectionStatistics& statistics) {
-    if (judged_passes >= gate_at && statistics.guided_share < kGateShare * noise_factor) {
+    const bool unused =
+        judged_passes >= gate_at && statistics.guided_share < kGateShare * noise_factor;
+    const bool first_time = gate_at == kGatePasses;
+    const bool hopeless = first_time && judged_passes >= kHopelessPasses && noise_factor >= 1.0 &&
+                          statistics.guided_share < kHopelessShare && statistics.moment_ratio > 1.0;
+    if (unused || hopeless) {
         closed = true;
         closed_passes = 0;
     }

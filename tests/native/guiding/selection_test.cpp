@@ -148,8 +148,11 @@ TEST(Selection, NoisyPicturesTurnOnEarlier) {
     }
 }
 
-TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
+// In a quiet picture after the third pass, in a noisy one not before the ninth.
+void expect_gate(double relative_variance, int expected_close) {
     GuideSelection selection(unit_box());
+    SelectionPass counted = work();
+    counted.relative_variance = relative_variance;
     Random random(5);
     int closed_at = -1;
     int opened_at = -1;
@@ -158,7 +161,7 @@ TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
         for (int i = 0; i < 500; ++i) {
             records.push_back(peaked_record(random, Vec3(0.5f), false, 0.0f));
         }
-        const SelectionStatistics statistics = selection.update(records, work());
+        const SelectionStatistics statistics = selection.update(records, counted);
         EXPECT_EQ(statistics.closed, selection.closed());
         if (closed_at < 0 && selection.closed()) {
             closed_at = pass;
@@ -166,10 +169,15 @@ TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
             opened_at = pass;
         }
     }
-    EXPECT_EQ(closed_at, 8);
+    EXPECT_EQ(closed_at, expected_close);
     EXPECT_EQ(opened_at, closed_at + 64);
     EXPECT_TRUE(selection.closed());
     EXPECT_EQ(selection.alpha(Vec3(0.5f), Vec3(0, 0, 1), false), 0.0f);
+}
+
+TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
+    expect_gate(1.0, 2);
+    expect_gate(8.0, 8);
 }
 
 TEST(Selection, OrderOfRecordsDoesNotMatter) {
