@@ -76,7 +76,8 @@ std::uint32_t GuideController::most_samples(std::uint32_t done) const {
 }
 
 void GuideController::see(const Film& film, std::uint32_t done) {
-    if (enabled_) {
+    // SLIDES guides from pass 1 on: what it shows there is no longer independent of pass 0.
+    if (selection_) {
         weights_.see(film, done);
     }
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/color.h"
+#include "session/pixel_estimate.h"
 
 namespace pharos {
 
@@ -15,17 +15,6 @@ constexpr double kFloor = 0.1;  // of the mean
 constexpr int kRadius = 3;
 // 1, 1, 2, 3, 4, 4, ...: near the inverse of the variance that guided passes were seen to have.
 constexpr double kLastWeight = 4.0;
-
-std::vector<float> luminances(const Film& film) {
-    const std::size_t pixels = std::size_t{film.width()} * film.height();
-    std::vector<float> combined(pixels * 4);
-    film.read(FilmPass::Combined, combined);
-    std::vector<float> out(pixels);
-    for (std::size_t i = 0; i < pixels; ++i) {
-        out[i] = luminance(Rgb(combined[4 * i], combined[4 * i + 1], combined[4 * i + 2]));
-    }
-    return out;
-}
 
 // Sums over windows of 2 kRadius + 1 pixels along an axis.
 std::vector<double> window_sums(const std::vector<double>& in, int width, int height, int axis) {
@@ -92,10 +81,10 @@ std::array<double, 2> relative_variance(const FirstPasses& passes) {
 
 void PassWeights::see(const Film& film, std::uint32_t done) {
     if (done == 1) {
-        passes_ = {film.width(), film.height(), luminances(film), {}};
+        passes_ = {film.width(), film.height(), film_luminance(film), {}};
     } else if (done == 2 && !passes_.first.empty()) {
         // Both passes weigh the same: the second is twice the mean less the first.
-        passes_.second = luminances(film);
+        passes_.second = film_luminance(film);
         for (std::size_t i = 0; i < passes_.second.size(); ++i) {
             passes_.second[i] = 2.0f * passes_.second[i] - passes_.first[i];
         }

@@ -51,18 +51,26 @@ float darker_quadrants(const Picture& means, int x, int y) {
 
 }  // namespace
 
-std::vector<float> estimate_pixels(const Film& film) {
+std::vector<float> film_luminance(const Film& film) {
     const std::size_t pixels = std::size_t{film.width()} * film.height();
     std::vector<float> combined(pixels * 4);
     film.read(FilmPass::Combined, combined);
-    Picture picture{static_cast<int>(film.width()), static_cast<int>(film.height()), {}};
-    picture.value.resize(pixels);
     const float unexposed = film.exposure() > 0.0f ? 1.0f / film.exposure() : 1.0f;
-    double mean = 0.0;
+    std::vector<float> out(pixels);
     for (std::size_t i = 0; i < pixels; ++i) {
-        picture.value[i] =
+        out[i] =
             unexposed * luminance(Rgb(combined[4 * i], combined[4 * i + 1], combined[4 * i + 2]));
-        mean += static_cast<double>(picture.value[i]);
+    }
+    return out;
+}
+
+std::vector<float> estimate_pixels(const Film& film) {
+    Picture picture{
+        static_cast<int>(film.width()), static_cast<int>(film.height()), film_luminance(film)};
+    const std::size_t pixels = picture.value.size();
+    double mean = 0.0;
+    for (const float value : picture.value) {
+        mean += static_cast<double>(value);
     }
     mean /= static_cast<double>(pixels);
     if (!(mean > 0.0)) {

@@ -13,6 +13,9 @@
 
 namespace pharos {
 
+// Luminance a pixel as the paths carried it: before exposure, row by row as the film keeps them.
+[[nodiscard]] std::vector<float> film_luminance(const Film& film);
+
 // Radiance's luminance a pixel (before exposure), row by row as the film keeps them, at least a
 // tenth of the picture's mean: empty while the picture is black. Finite for finite films.
 [[nodiscard]] std::vector<float> estimate_pixels(const Film& film);

@@ -148,6 +148,30 @@ TEST(Selection, NoisyPicturesTurnOnEarlier) {
     }
 }
 
+// A's sum over what arrived, apart for diffuse and glossy vertices; and the share that gains most.
+TEST(Selection, CalibrationIsWhatWasExpectedOverWhatArrived) {
+    GuideSelection selection(unit_box());
+    Random random(8);
+    SelectionStatistics statistics;
+    for (int pass = 0; pass < 3; ++pass) {
+        std::vector<SelectionRecord> records;
+        for (int i = 0; i < 2000; ++i) {
+            SelectionRecord r = peaked_record(random, random.uniform3(), true, 0.25f);
+            r.glossy = i % 2 == 0;
+            const float arrived =
+                (r.hit_radiance > 0.0f ? r.hit_radiance / (r.hit_pdf_light + r.pdf_used) : 0.0f) +
+                r.indirect / r.pdf_used;
+            r.expected = (r.glossy ? 0.5f : 3.0f) * arrived;
+            r.weight = std::min(r.weight, 1e-4f);  // below the limit of one record
+            records.push_back(r);
+        }
+        statistics = selection.update(records, work());
+    }
+    EXPECT_NEAR(statistics.calibration[0], 3.0, 1e-2);
+    EXPECT_NEAR(statistics.calibration[1], 0.5, 1e-2);
+    EXPECT_GT(statistics.best_share, 0.0f);
+}
+
 // In a quiet picture after the third pass, in a noisy one not before the ninth.
 void expect_gate(double relative_variance, int expected_close) {
     GuideSelection selection(unit_box());
