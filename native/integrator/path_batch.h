@@ -111,6 +111,7 @@ struct PathBatch {
     std::vector<Guide> guides;
     std::vector<std::uint32_t> vertex_record;  // open record of the surface, else kNone
     std::vector<std::uint32_t> query_surface;  // the surfaces the field is asked about
+    std::vector<const Closure*> query_lobe;    // and the closure that matters most there
     std::array<std::vector<float>, 6> query;   // their positions and normals
     std::vector<VmfMixture> mixtures;          // the answers
     std::vector<VertexRecord> records;         // of the whole batch

@@ -51,17 +51,16 @@ struct LobeSummary {
 
 // The axis and width of the lobe that the mixture is multiplied by, for a narrow dominant
 // reflection.
-void multiply_by_reflection(const Bsdf& bsdf, VmfMixture& mixture) {
-    const Closure* lobe = summarize(bsdf).dominant;
+void multiply_by_reflection(const Closure* lobe, const Vec3& wo, VmfMixture& mixture) {
     if (lobe == nullptr || lobe->type != ClosureType::GgxReflection) {
         return;
     }
     const float alpha = std::sqrt(lobe->alpha_x * lobe->alpha_y);
-    const float cos_o = glm::dot(lobe->n, bsdf.wo);
+    const float cos_o = glm::dot(lobe->n, wo);
     if (alpha > kMaxProductAlpha || cos_o <= 0.0f) {
         return;
     }
-    const Vec3 axis = lobe->n * (2.0f * cos_o) - bsdf.wo;
+    const Vec3 axis = lobe->n * (2.0f * cos_o) - wo;
     mixture = multiply_lobe(mixture, axis, product_kappa(alpha, cos_o));
 }
 
@@ -87,9 +86,10 @@ std::uint32_t open_record(const RenderContext& context,
     return static_cast<std::uint32_t>(batch.records.size() - 1);
 }
 
-void queue_query(std::size_t s, PathBatch& batch) {
+void queue_query(std::size_t s, const Closure* lobe, PathBatch& batch) {
     const SurfaceInteraction& surface = batch.surfaces[s];
     batch.query_surface.push_back(static_cast<std::uint32_t>(s));
+    batch.query_lobe.push_back(lobe);
     for (int axis = 0; axis < 3; ++axis) {
         batch.query[static_cast<std::size_t>(axis)].push_back(surface.p[axis]);
         batch.query[static_cast<std::size_t>(axis) + 3].push_back(surface.ns[axis]);
@@ -127,7 +127,7 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
             std::max(guide.share, guiding.selection->alpha(surface.p, surface.ns, glossy));
     }
     if (guide.share > 0.0f || (recorded && guiding.probe)) {
-        queue_query(s, batch);
+        queue_query(s, lobes.dominant, batch);
     }
 }
 
@@ -144,6 +144,7 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     batch.guides.assign(count, Guide{});
     batch.vertex_record.assign(count, kNone);
     batch.query_surface.clear();
+    batch.query_lobe.clear();
     for (auto& values : batch.query) {
         values.clear();
     }
@@ -164,7 +165,7 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     context.guiding.field->evaluate(query, batch.mixtures);
     for (std::size_t q = 0; q < queries; ++q) {
         const std::uint32_t s = batch.query_surface[q];
-        multiply_by_reflection(batch.bsdfs[s], batch.mixtures[q]);
+        multiply_by_reflection(batch.query_lobe[q], batch.bsdfs[s].wo, batch.mixtures[q]);
         batch.guides[s].mixture = &batch.mixtures[q];
     }
     return queries;

@@ -106,20 +106,32 @@ void complete_record(
     batch.last_record[path] = batch.vertex_record[s];
 }
 
-// Samples one continuation of a vertex on path slot `path`.
+// Random numbers of a path's scattering at its vertex: closure, direction (2), roulette.
+[[nodiscard]] Vec4 scattering_random(const PathBatch& batch, std::uint32_t path) {
+    return sobol_4d(
+        batch.sampler_hash[path], batch.sample_index[path], 2u + 2u * batch.counters[path].depth);
+}
+
+// One continuation of a vertex.
+struct Departure {
+    std::uint32_t path = 0;  // its slot
+    float survival = 1.0f;   // of the roulette before
+    Vec4 u{0.0f};
+};
+
+// Samples one continuation of surface s.
 void scatter(const RenderContext& context,
              std::size_t s,
-             std::uint32_t path,
-             float survival,
+             const Departure& departure,
              PathBatch& batch) {
+    const auto [path, survival, u] = departure;
     const PathCounters& counters = batch.counters[path];
-    const std::uint32_t hash = batch.sampler_hash[path];
-    const std::uint32_t index = batch.sample_index[path];
-    const Vec4 u = sobol_4d(hash, index, 2u + 2u * counters.depth);
     const Guide guide = batch.guides.empty() ? Guide{} : batch.guides[s];
     ScatteringRandom random{u.x, 0.0f, Vec2(u.y, u.z)};
     if (guide.share > 0.0f) {
-        random.guide = sobol_4d(hash, index, kGuideSet + counters.depth).x;
+        random.guide =
+            sobol_4d(batch.sampler_hash[path], batch.sample_index[path], kGuideSet + counters.depth)
+                .x;
     }
     const auto sample = sample_guided(batch.bsdfs[s], guide, random);
     if (!sample || (counters.terminate_at_surface && !(sample->lobe & kLobeTransparent))) {
@@ -184,8 +196,7 @@ std::uint32_t copy_path(std::uint32_t path, std::uint32_t copy, PathBatch& batch
 // Roulette, splitting and scattering of one vertex.
 void leave_vertex(const RenderContext& context, std::size_t s, PathBatch& batch) {
     const std::uint32_t path = batch.surface_path[s];
-    const Vec4 u = sobol_4d(
-        batch.sampler_hash[path], batch.sample_index[path], 2u + 2u * batch.counters[path].depth);
+    const Vec4 u = scattering_random(batch, path);
     const RouletteDecision decision = roulette(context, s, u.w, batch);
     if (decision.copies == 0) {
         return;
@@ -211,7 +222,8 @@ void leave_vertex(const RenderContext& context, std::size_t s, PathBatch& batch)
     }
     const float survival = decision.weight > 1.0f ? 1.0f / decision.weight : 1.0f;
     for (std::size_t i = 0; i < count; ++i) {
-        scatter(context, s, slots[i], survival, batch);
+        const Vec4 own = i == 0 ? u : scattering_random(batch, slots[i]);
+        scatter(context, s, {slots[i], survival, own}, batch);
     }
 }
 
