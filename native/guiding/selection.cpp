@@ -198,6 +198,28 @@ std::uint8_t decide(const Estimate& e, std::uint8_t current, double threshold) {
 
 }  // namespace
 
+// Shares of all cells in two bits each: looked up at every vertex, small enough to stay in a cache.
+class ShareTable {
+  public:
+    explicit ShareTable(std::size_t cells) : bytes_((cells + 3) / 4) {}
+
+    [[nodiscard]] std::uint8_t operator[](std::uint32_t cell) const {
+        return static_cast<std::uint8_t>((bytes_[cell / 4] >> shift(cell)) & 3u);
+    }
+
+    void set(std::uint32_t cell, std::uint8_t share) {
+        std::uint8_t& byte = bytes_[cell / 4];
+        byte = static_cast<std::uint8_t>((byte & ~(3u << shift(cell))) | (share << shift(cell)));
+    }
+
+  private:
+    static unsigned shift(std::uint32_t cell) { return 2 * (cell % 4); }
+
+    std::vector<std::uint8_t> bytes_;
+};
+
+static_assert(kShares <= 4);
+
 struct GuideSelection::Impl {
     struct Cell {
         std::uint32_t index = 0;
@@ -214,7 +236,7 @@ struct GuideSelection::Impl {
 
     Vec3 lower{0.0f};
     Vec3 scale{0.0f};
-    std::vector<std::uint8_t> share;  // index into kShare, per cell: what alpha() reads
+    ShareTable share{kCells};         // index into kShare, per cell: what alpha() reads
     std::vector<std::uint32_t> slot;  // of the touched cells
     std::vector<Cell> cells;
     std::vector<Parent> parents;
@@ -368,7 +390,7 @@ void GuideSelection::Impl::decide_parents(double threshold) {
             parent.share = next;
             for_each_child(static_cast<std::uint32_t>(i), [&](std::uint32_t child) {
                 if (slot[child] == kUntouched) {
-                    share[child] = next;
+                    share.set(child, next);
                 }
             });
         }
@@ -382,7 +404,7 @@ void GuideSelection::Impl::decide_cells(double threshold) {
         const Moments shrunk = shrink(cell.sums, above);
         const double records = cell.sums.count + std::min(parent.sums.count, kPriorCount);
         cell.share = decide(estimate(shrunk, records), cell.share, threshold);
-        share[cell.index] = cell.share;
+        share.set(cell.index, cell.share);
     }
 }
 
@@ -441,7 +463,6 @@ GuideSelection::GuideSelection(const Bounds3& scene_box) : impl_(std::make_uniqu
             impl_->scale[axis] = extent > 1e-30f ? static_cast<float>(kGrid) / extent : 0.0f;
         }
     }
-    impl_->share.assign(kCells, 0);
     impl_->slot.assign(kCells, kUntouched);
     impl_->parents.resize(kParents);
 }
