@@ -184,6 +184,11 @@ class PHAROS_RENDER_PT_performance(_RenderPanel, bpy.types.Panel):
         layout.prop(render, "threads_mode")
         if render.threads_mode == "FIXED":
             layout.prop(render, "threads")
+        settings = context.scene.pharos
+        layout.prop(settings, "use_checkpoint")
+        interval = layout.column()
+        interval.active = settings.use_checkpoint
+        interval.prop(settings, "checkpoint_interval", text="Minutes Between")
 
 
 class PHAROS_RENDER_PT_report(_RenderPanel, bpy.types.Panel):

@@ -165,6 +165,19 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         description="Take samples, seed, bounces and film from the scene's Cycles settings",
         default=False,
     )
+    use_checkpoint: BoolProperty(
+        name="Checkpoints",
+        description="Keep a final render beside its picture while it is under way. When Blender is "
+        "stopped, rendering the frame again goes on where it was, to the same picture",
+        default=False,
+    )
+    checkpoint_interval: FloatProperty(
+        name="Interval",
+        description="Minutes between two checkpoints; one more is written when a render is stopped",
+        default=5.0,
+        min=0.05,
+        soft_max=60.0,
+    )
     report: CollectionProperty(
         name="Report",
         description="What the last render could not take as given (read only)",

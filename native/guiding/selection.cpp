@@ -53,6 +53,10 @@ constexpr double kMomentUnit = 0x1p-32;
 constexpr double kSquareUnit = 0x1p-20;
 constexpr double kContributionUnit = 0x1p-32;
 
+// A sum in a file above this is not one of ours: no render lasts so long.
+constexpr double kMaxLoadedSum = 1e100;
+constexpr double kMaxLoadedCount = 1e12;  // of records: in whole numbers of kSquareUnit it fits
+
 // Sums over records: second moments per share, squares of the differences to share 0, count.
 struct Moments {
     std::array<double, kShares> moment{};
@@ -76,12 +80,22 @@ struct Moments {
     }
 };
 
+template <class Archive>
+void state_fields(Archive& archive, Moments& moments) {
+    archive(moments.moment, moments.square, moments.count);
+}
+
 // Contributions to the pixel, in units of what it shows: expected by A, and arrived. Whole numbers
 // of kContributionUnit while a pass adds up.
 struct Contributions {
     double expected = 0.0;
     double arrived = 0.0;
 };
+
+template <class Archive>
+void state_fields(Archive& archive, Contributions& contributions) {
+    archive(contributions.expected, contributions.arrived);
+}
 
 // One record counts for 50 pixels at most, so that neither a firefly nor a single wrong A decides.
 Contributions contributions(const SelectionRecord& r) {
@@ -233,6 +247,17 @@ struct GuideSelection::Impl {
         std::uint8_t share = 0;
         Moments sums;
     };
+
+    // Between passes: what a pass adds up is empty.
+    template <class Archive>
+    friend void state_fields(Archive& archive, Cell& cell) {
+        archive(cell.index, cell.share, cell.sums);
+    }
+
+    template <class Archive>
+    friend void state_fields(Archive& archive, Parent& parent) {
+        archive(parent.share, parent.sums);
+    }
 
     Vec3 lower{0.0f};
     Vec3 scale{0.0f};
@@ -512,6 +537,46 @@ SelectionStatistics GuideSelection::update(std::span<const SelectionRecord> reco
 
 bool GuideSelection::closed() const {
     return impl_->closed;
+}
+
+void GuideSelection::save(StateWriter& out) const {
+    Impl& s = *impl_;
+    out(s.lower, s.scale, s.share, s.cells, s.parents, s.global, s.contributed, s.variance_sum);
+    out(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
+    out(s.closed, s.gate_at);
+}
+
+void GuideSelection::load(StateReader& in) {
+    Impl& s = *impl_;
+    in(s.lower, s.scale);
+    in.expect(s.share);
+    in(s.cells);
+    in.expect(s.parents);
+    in(s.global, s.contributed, s.variance_sum);
+    in(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
+    in(s.closed, s.gate_at);
+    const auto is_amount = [](double x) { return x >= 0.0 && x < kMaxLoadedSum; };
+    const auto is_sound = [&](const Moments& m) {
+        return std::ranges::all_of(m.moment, is_amount) &&
+               std::ranges::all_of(m.square, is_amount) && m.count >= 0.0 &&
+               m.count < kMaxLoadedCount;
+    };
+    StateReader::require(is_finite(s.lower) && is_finite(s.scale) && is_sound(s.global) &&
+                         is_amount(s.variance_count) && is_amount(s.variance_sum) &&
+                         (s.variance_count == 0.0 || s.variance_sum / s.variance_count > 0.0) &&
+                         s.noise_factor > 0.0 && s.noise_factor <= 1.0);
+    const auto is_share = [](std::uint8_t share) { return share < kShares; };
+    StateReader::require(std::ranges::all_of(s.share, is_share) &&
+                         std::ranges::all_of(s.parents, is_share, &Impl::Parent::share) &&
+                         std::ranges::all_of(s.parents, is_sound, &Impl::Parent::sums));
+    std::ranges::fill(s.slot, kUntouched);
+    for (std::size_t i = 0; i < s.cells.size(); ++i) {
+        Impl::Cell& cell = s.cells[i];
+        StateReader::require(cell.index < kCells && s.slot[cell.index] == kUntouched &&
+                             is_share(cell.share) && is_sound(cell.sums));
+        s.slot[cell.index] = static_cast<std::uint32_t>(i);
+        cell.parent = parent_of(cell.index);
+    }
 }
 
 }  // namespace pharos

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "core/state_archive.h"
 
 namespace pharos {
 
@@ -42,6 +43,13 @@ struct SelectionRecord {
     float expected = 0.0f;  // what the guide's A says of hit and indirect together, before sampling
     std::uint64_t key = 0;
 };
+
+template <class Archive>
+void state_fields(Archive& archive, SelectionRecord& r) {
+    archive(r.position, r.normal, r.glossy, r.weight, r.nee_radiance, r.nee_pdf_light);
+    archive(r.nee_pdf_bsdf, r.nee_pdf_guide, r.hit_radiance, r.hit_pdf_light, r.indirect);
+    archive(r.pdf_used, r.pdf_bsdf, r.pdf_guide, r.expected, r.key);
+}
 
 // What a pass cost and how noisy it was, counted.
 struct SelectionPass {
@@ -77,6 +85,11 @@ class GuideSelection {
     // True: nothing is guided and nothing need be recorded. The gate opens again for probing passes
     // by pass number alone.
     [[nodiscard]] bool closed() const;
+
+    // All that was learned, the scene's box included. load() throws StateError, and the selection
+    // is then to be thrown away.
+    void save(StateWriter& out) const;
+    void load(StateReader& in);
 
   private:
     struct Impl;

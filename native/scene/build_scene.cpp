@@ -138,7 +138,7 @@ void SceneBuild::load_textures() {
     });
     for (const SceneReport& report : reports) {
         for (const ReportEntry& entry : report.entries()) {
-            report_.add(entry.severity, entry.object, entry.message);
+            report_.add(entry);
         }
     }
 }
