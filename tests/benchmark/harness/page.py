@@ -100,7 +100,7 @@ def _stages(rows, engines):
             colours = svg.colours_of(shown)
             labels = {f"{name} {100 * value / total:.0f} %": colours[name]
                       for name, value in shown.items()}
-            parts += [paragraph(f"{engine}: {total:.2f} CPU seconds in stages", "note"),
+            parts += [paragraph(f"{engine}: {total:.2f} seconds of its threads in stages", "note"),
                       svg.bar(shown, colours), svg.legend(labels)]
     return parts
 

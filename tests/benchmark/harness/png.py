@@ -1,4 +1,4 @@
-"""Small pictures for the page: linear floats to an sRGB PNG, with nothing but the standard library."""
+"""Small pictures for the page: linear floats to an sRGB PNG, by the standard library alone."""
 
 import struct
 import zlib

@@ -1,4 +1,4 @@
-"""The README's section of figures, made from measured rows; hands off what lies between the marks."""
+"""The README's section of figures, made from measured rows: what stands between the marks."""
 
 import math
 
@@ -27,7 +27,7 @@ def engine_title(engine):
 
 
 def _short(value):
-    return f"{value:.2g}" if 9.95 <= value else f"{value:.1f}" if value >= 1.995 else f"{value:.2f}"
+    return f"{value:.1f}" if value >= 1.995 else f"{value:.2f}"
 
 
 def _interval(ratio):
@@ -87,19 +87,28 @@ def _other_times(rows, meta, times):
     return sentences
 
 
+def _by_rival(behind, words):
+    """Scenes of each rival, as one phrase."""
+    rivals = dict.fromkeys(r.rival for r in behind)
+    return "; ".join(f"against {engine_title(rival)}, " + ", ".join(words(r) for r in behind
+                                                           if r.rival == rival)
+                     for rival in rivals)
+
+
 def _losses(rows, meta):
     """Where Pharos is behind, in words."""
     sentences = []
     for samples in meta["at"]:
         behind = report.losses(rows, meta["baseline"], samples)
-        sure = [f"{scene_title(r.scene)} {_short(r.ratio.value)}x{_interval(r.ratio)} of "
-                f"{engine_title(r.rival)}" for r in behind if r.ratio.high < 1.0]
-        even = [f"{scene_title(r.scene)} {_short(r.ratio.value)}x of {engine_title(r.rival)}"
-                for r in behind if not r.ratio.high < 1.0]
+        sure = [r for r in behind if r.ratio.high < 1.0]
+        even = [r for r in behind if not r.ratio.high < 1.0]
         if sure:
-            sentences.append(f"At {samples} samples Pharos loses: {'; '.join(sure)}.")
+            words = _by_rival(sure, lambda r: f"{scene_title(r.scene)} {_short(r.ratio.value)}x"
+                                              f"{_interval(r.ratio)}")
+            sentences.append(f"Losses at {samples} samples: {words}.")
         if even:
-            sentences.append(f"Within the noise at {samples} samples: {'; '.join(even)}.")
+            words = _by_rival(even, lambda r: f"{scene_title(r.scene)} {_short(r.ratio.value)}x")
+            sentences.append(f"Behind by less than the noise: {words}.")
     return sentences or ["Pharos loses on none of these scenes."]
 
 
@@ -108,7 +117,8 @@ def _made_by(meta):
     versions = ", ".join(f"{name} {version}" for name, version in meta.get("versions", {}).items())
     size = f"; pictures of {common[0]} x {common[1]} pixels" if common else ""
     return (f"Measured on {meta.get('date', 'an unknown day')}: {meta.get('machine', '')}, "
-            f"{meta.get('threads', 2)} threads; {versions}{size}, {meta['seeds']} seeds.")
+            f"{meta.get('threads', 2)} threads; {versions}{size}, {meta['seeds']} seeds."
+            + (f" {meta['note']}" if "note" in meta else ""))
 
 
 def section(meta, rows):

@@ -50,15 +50,14 @@ class _Axis:
 
 
 def _grid(x, y, x_title, y_title):
-    parts = []
-    for value in x.ticks():
-        parts.append(f'<line class="g" x1="{x(value):.1f}" x2="{x(value):.1f}" y1="{TOP}" '
-                     f'y2="{HEIGHT - BOTTOM}"/><text class="t" x="{x(value):.1f}" '
-                     f'y="{HEIGHT - BOTTOM + 14}" text-anchor="middle">{_label(value)}</text>')
-    for value in y.ticks():
-        parts.append(f'<line class="g" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" '
-                     f'y2="{y(value):.1f}"/><text class="t" x="{LEFT - 5}" '
-                     f'y="{y(value) + 3.5:.1f}" text-anchor="end">{_label(value)}</text>')
+    parts = [f'<line class="g" x1="{x(value):.1f}" x2="{x(value):.1f}" y1="{TOP}" '
+             f'y2="{HEIGHT - BOTTOM}"/><text class="t" x="{x(value):.1f}" '
+             f'y="{HEIGHT - BOTTOM + 14}" text-anchor="middle">{_label(value)}</text>'
+             for value in x.ticks()]
+    parts += [f'<line class="g" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" '
+              f'y2="{y(value):.1f}"/><text class="t" x="{LEFT - 5}" '
+              f'y="{y(value) + 3.5:.1f}" text-anchor="end">{_label(value)}</text>'
+              for value in y.ticks()]
     middle = (TOP + HEIGHT - BOTTOM) / 2
     parts.append(f'<text class="a" x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 8}" '
                  f'text-anchor="middle">{x_title}</text><text class="a" x="13" y="{middle}" '
