@@ -114,7 +114,7 @@ def keep_crops(folder, budget):
     """A function that writes the cutouts of the first seed's pictures of one budget."""
 
     def keep(scene, engine, shot, pair):
-        if shot.seed != 1 or (shot.budget or shot.samples) != budget:
+        if shot.seed != 1 or shot.budget != budget:
             return
         reference = 0.5 * (pair[0] + pair[1])
         (folder / scene.name).mkdir(parents=True, exist_ok=True)

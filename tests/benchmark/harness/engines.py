@@ -34,7 +34,11 @@ class Shot:
     seconds: float  # CPU seconds of rendering, scene preparation included, divided by threads
     pixels: np.ndarray  # (height, width, 3) float32, bottom row first
     facts: dict = field(default_factory=dict)  # further columns of results.py
-    budget: int = 0  # samples asked for, where a pass reached past them
+    budget: int | None = None  # what was asked for, where that is not `samples`
+
+    def __post_init__(self):
+        if self.budget is None:
+            self.budget = self.samples
 
 
 def cache_folder():

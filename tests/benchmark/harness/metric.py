@@ -16,6 +16,7 @@ import numpy as np
 
 EPSILON = 0.01
 TRIMMED_SHARE = 0.001
+CUTOUT_TRIMMED_SHARE = 0.01  # of some hundred pixels
 BIAS_FLOOR = 0.1
 SURE_SIGMAS = 4.0
 LEAST_BIAS = 0.0025
@@ -27,13 +28,13 @@ class Error:
     trimmed: float
 
 
-def relative_error(picture, half_a, half_b):
+def relative_error(picture, half_a, half_b, trimmed_share=TRIMMED_SHARE):
     """Raw and trimmed relMSE of a picture against two halves of a reference."""
     picture = np.nan_to_num(picture.astype(np.float64), nan=1e3, posinf=1e3, neginf=-1e3)
     reference = 0.5 * (half_a + half_b)
     squares = (picture - half_a) * (picture - half_b) / (reference**2 + EPSILON)
     pixels = np.sort(squares.mean(axis=-1).ravel())
-    kept = pixels[: max(1, int(pixels.size * (1.0 - TRIMMED_SHARE)))]
+    kept = pixels[: max(1, int(pixels.size * (1.0 - trimmed_share)))]
     return Error(float(pixels.mean()), float(kept.mean()))
 
 

@@ -39,10 +39,12 @@ def row_of(scene, name, shot, pair):
     error = metric.relative_error(shot.pixels, *pair)
     bias = metric.bias_of(shot.pixels, *pair)
     nonfinite = metric.nonfinite_pixels(shot.pixels)
-    parts = {place: metric.relative_error(*(cutout(p, box) for p in (shot.pixels, *pair))).raw
-             for place, box in scene.cutouts().items()}
+    parts = {}
+    for place, box in scene.cutouts().items():
+        pictures = (cutout(pixels, box) for pixels in (shot.pixels, *pair))
+        parts[place] = metric.relative_error(*pictures, metric.CUTOUT_TRIMMED_SHARE).trimmed
     row = {"scene": scene.name, "engine": name, "samples": shot.samples,
-           "budget": shot.budget or shot.samples, "seed": shot.seed, "seconds": shot.seconds,
+           "budget": shot.budget, "seed": shot.seed, "seconds": shot.seconds,
            "raw": error.raw, "trimmed": error.trimmed, "bias": bias.value,
            "bias_error": bias.error, "bias_reference_error": bias.reference_error,
            "reference_noise": metric.reference_error(*pair), "nonfinite": nonfinite,
