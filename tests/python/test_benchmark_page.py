@@ -98,7 +98,7 @@ def test_page_is_one_file_with_curves_losses_and_troubles(tmp_path):
     assert "<script" not in text
     assert text.count("<polyline") == 12  # six engines' curves, over time and over samples
     assert "door@128 0.64 s 2.00x" in words
-    assert "glass@128: 0.40x [0.39, 0.41] of cycles" in words
+    assert "glass@128: 0.40x [0.39, 0.41] against cycles" in words
     assert "glass@128: 0.80x" in words
     assert "it <broke>" in words
     assert "+0.120 %" in words

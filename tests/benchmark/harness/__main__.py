@@ -10,7 +10,18 @@ import sys
 import time
 from pathlib import Path
 
-from harness import engines, machine, metric, page, png, readme, references, report, results
+from harness import (
+    engines,
+    machine,
+    metric,
+    page,
+    png,
+    process,
+    readme,
+    references,
+    report,
+    results,
+)
 from harness.runner import Plan, Runner, cutout
 from harness.scenes import ROOT, Engine, all_engines, all_scenes
 
@@ -36,7 +47,8 @@ def parse(arguments):
     parser.add_argument("--reference", type=int, help="samples of each half of the references")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--nee", choices=("on", "off"), default="on",
-                        help="without next-event estimation: the published protocol")
+                        help="Pharos without next-event estimation, the published protocol; "
+                             "released Cycles cannot leave it out")
     parser.add_argument("--compare-builds", nargs=2, metavar="CLI", type=Path,
                         help="two pharos-cli programs in place of the engines")
     parser.add_argument("--out", type=Path, default=ROOT / "build/benchmark/results.csv")
@@ -67,7 +79,8 @@ def chosen_engines(options):
         names = (options.engines or ENGINES).split(",")
         picked = {name: (table[name], None) for name in names}
     for engine, _ in picked.values():
-        engine.options["nee"] = options.nee
+        if engine.program == "pharos":
+            engine.options["nee"] = options.nee
     return picked
 
 
@@ -178,12 +191,14 @@ def publish(meta, rows):
     kept = {key: value for key, value in meta.items() if key != "conditions"}
     results.write(PUBLISHED, kept, rows)
     path = ROOT / "README.md"
-    text = readme.replaced(path.read_text(encoding="utf-8"), readme.section(kept, rows))
+    part = readme.section(*results.read(PUBLISHED))
+    text = readme.replaced(path.read_text(encoding="utf-8"), part)
     path.write_text(text, encoding="utf-8")
 
 
 def main(arguments):
     options = parse(arguments)
+    process.end_on_termination()
     started = time.monotonic()
 
     def say(text):

@@ -49,8 +49,6 @@ def prepare(job):
     cycles.use_guiding = cycles.use_surface_guiding = job["guiding"]
     cycles.use_volume_guiding = False
     cycles.guiding_training_samples = 0  # never stop learning: its best setting for long renders
-    if not job["nee"]:
-        cycles.direct_light_sampling_type = "FORWARD_PATH_TRACING"
     return scene
 
 

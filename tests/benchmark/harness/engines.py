@@ -50,7 +50,7 @@ def _cycles(command, scene, options, runs, threads, timeout=3600):
     with tempfile.TemporaryDirectory() as folder:
         job = {"name": scene.name, "runs": runs, "threads": threads, "bounces": BOUNCES,
                "resolution": scene.resolution, "guiding": options.get("guiding", False),
-               "nee": options.get("nee", "on") == "on", "began": time.time()}
+               "began": time.time()}
         done = process.run([*command, scene.file, folder, json.dumps(job)], timeout)
         facts, count = {}, 0
         for line in done.out.splitlines():
@@ -91,9 +91,10 @@ def dump_file(scene):
     about = path.with_suffix(".json")
     if not (path.exists() and about.exists() and path.stat().st_mtime_ns > newest):
         path.parent.mkdir(parents=True, exist_ok=True)
-        done = process.check(
-            process.run([sys.executable, EXPORTER, scene.file, path, *map(str, scene.resolution),
-                         str(BOUNCES), str(time.time())], 600), EXPORTER)
+        command = [sys.executable, EXPORTER, scene.file, path, *scene.resolution, BOUNCES,
+                   time.time()]
+        scripts = {"BLENDER_USER_SCRIPTS": str(ROOT / "build/blender")}
+        done = process.check(process.run(command, 600, os.environ | scripts), EXPORTER)
         line = next(line for line in done.out.splitlines() if line.startswith("EXPORTED "))
         about.write_text(line.split(" ", 1)[1])
     return path, json.loads(about.read_text())

@@ -5,21 +5,20 @@ from html import escape
 
 STYLE = """
 :root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;color:#1d2327;background:#fbfaf7;
-max-width:980px;margin:2.2em auto;padding:0 1.2em}h1{font-size:1.7em;margin-bottom:.1em}
+max-width:1020px;margin:2.2em auto;padding:0 1.2em}h1{font-size:1.7em;margin-bottom:.1em}
 h2{margin-top:2.2em;border-bottom:1px solid #d9d5cb;padding-bottom:.15em}h3{margin:1.3em 0 .3em}
 table{border-collapse:collapse;margin:.7em 0;font-variant-numeric:tabular-nums}
-th,td{padding:.22em .75em;text-align:right;border-bottom:1px solid #e6e2d8}
+th,td{padding:.22em .75em;white-space:nowrap;text-align:right;border-bottom:1px solid #e6e2d8}
 th:first-child,td:first-child{text-align:left}th{font-weight:600;color:#4b545a}
-.win{color:#0b6e4f;font-weight:600}.loss{color:#b0341d;font-weight:600}.note{color:#5f6b73}
+.wide{overflow-x:auto}.win{color:#0b6e4f;font-weight:600}.loss{color:#b0341d;font-weight:600}.note{color:#5f6b73}
 .charts{display:flex;flex-wrap:wrap;gap:12px}.charts svg{flex:1 1 420px;max-width:470px;
-background:#fff;border:1px solid #e6e2d8}.g{stroke:#ece9e1}.t{font-size:10.5px;fill:#5f6b73}
-.a{font-size:11.5px;fill:#1d2327}.legend span{margin-right:1.2em;white-space:nowrap}
+background:#fff;border:1px solid #e6e2d8}.legend span{margin-right:1.2em;white-space:nowrap}
 .legend i{display:inline-block;width:.85em;height:.85em;margin-right:.35em;vertical-align:-.08em}
 .crops{display:flex;flex-wrap:wrap;gap:10px}.crops figure{margin:0}
 .crops img{display:block;width:150px;image-rendering:pixelated;border:1px solid #d9d5cb}
 .crops figcaption{font-size:12px;width:150px}.bar{width:100%;max-width:600px;height:18px}
 code,pre{font:13px/1.45 ui-monospace,monospace;background:#f1eee6;padding:.1em .3em}
-pre{padding:.6em .8em;overflow-x:auto}
+pre{padding:.6em .8em;white-space:pre-wrap}
 """
 
 
@@ -44,7 +43,7 @@ def _cell(tag, value):
 def table(head, rows):
     lines = ["<tr>" + "".join(_cell("th", cell) for cell in head) + "</tr>"]
     lines += ["<tr>" + "".join(_cell("td", cell) for cell in row) + "</tr>" for row in rows]
-    return "<table>\n" + "\n".join(lines) + "\n</table>"
+    return '<div class="wide"><table>\n' + "\n".join(lines) + "\n</table></div>"
 
 
 def listed(lines):

@@ -52,7 +52,7 @@ def _overview(rows, meta, samples):
     means = report.geometric_means(entries, baseline)
     lines.append(["geometric mean", "", *(f"{means[e]:.2f}x" if e in means else ""
                                           for e in engines)])
-    behind = [f"{r.scene}: {report.ratio_words(r.ratio)} of {r.rival}"
+    behind = [f"{r.scene}: {report.ratio_words(r.ratio)} against {r.rival}"
               + ("" if r.ratio.high < 1.0 else ", within the noise")
               for r in report.losses(rows, baseline, samples)]
     return [f"<h3>At the time {escape(baseline)} takes for {samples} samples a pixel</h3>",
@@ -80,8 +80,8 @@ def _costs(rows, engines):
         counts = [sum(row.get(column, 0) for row in mine) for column in ("nonfinite", "dropped")]
         lines.append([engine, *(_mean_cell(mine, *column) for column in columns),
                       *(str(count) for count in counts)])
-    head = ["", "start-up s", "export s", "build s", "peak MiB", "vertices a sample",
-            "rays a sample", "ns a vertex", "% guided", "non-finite pixels", "dropped samples"]
+    head = ["", "start-up s", "export s", "build s", "peak MiB", "vertices", "rays",
+            "ns a vertex", "% guided", "non-finite", "dropped"]
     return table(head, lines)
 
 

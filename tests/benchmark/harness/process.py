@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -58,6 +59,11 @@ def run(command, timeout, env=None):
     if late.is_set():
         said += f"\nno end after {timeout:g} s"
     return Done(child.returncode, texts[0], said, wall, usage.ru_maxrss * 1024)
+
+
+def end_on_termination():
+    """SIGTERM ends this program as Ctrl-C does: by way of run(), which ends its child."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 
 
 def check(done, name):

@@ -39,7 +39,7 @@ def _cell(ratio):
     return (f"**{word}**" if ratio.low > 1.0 else word) + _interval(ratio)
 
 
-def _wrapped(text):
+def wrapped(text):
     """Lines no longer than the README's."""
     lines, line = [], ""
     for word in text.split():
@@ -125,18 +125,18 @@ def section(meta, rows):
     """The text between the marks, which are part of it."""
     good = [row for row in rows if "trimmed" in row]
     first, *others = meta["at"]
-    lines = [BEGIN, *_wrapped(
+    lines = [BEGIN, *wrapped(
         f"How many times less error than {engine_title(meta['baseline'])}, at the time that takes "
         f"for {first} samples a pixel; in brackets the 95 % interval over seeds. Below 1x is a "
         "loss."), "", *_table(good, meta, first), ""]
     for sentence in (_other_times(good, meta, others), _losses(good, meta)):
         if sentence:
-            lines += [*_wrapped(" ".join(sentence)), ""]
-    lines += [*_wrapped(_made_by(meta)), "", "```", *_command(meta["command"]), "```", END]
+            lines += [*wrapped(" ".join(sentence)), ""]
+    lines += [*wrapped(_made_by(meta)), "", "```", *command_lines(meta["command"]), "```", END]
     return "\n".join(lines)
 
 
-def _command(command):
+def command_lines(command):
     """A long command over several lines."""
     lines = [""]
     for word in command.split():
@@ -153,7 +153,7 @@ def between(text, begin, end):
     return text[:start], text[start:stop], text[stop:]
 
 
-def replaced(text, part):
-    """The README with its section replaced."""
-    before, _, after = between(text, BEGIN, END)
+def replaced(text, part, begin=BEGIN, end=END):
+    """The README with what stands between two marks replaced by a part that has them."""
+    before, _, after = between(text, begin, end)
     return before + part + after

@@ -23,6 +23,7 @@ from harness import (
     pictures,
     png,
     process,
+    readme,
     references,
     report,
     results,
@@ -42,8 +43,10 @@ MODES = {"NEE and BSDF": ("OFF", "on"), "position": ("SLIDES-POSITION", "on"),
          "mixture without NEE": ("SLIDES-MIXTURE", "off")}
 LONG_PASSES = 10_000
 LONG_SIZE = (16, 12)
+UNTOLD = ("--publish", "--fresh")  # of the command that made the figures
 EDGE_SCENE, EDGE_FRAMES = "lamp", 64
 OUT = ROOT / "build/benchmark/slides.csv"
+PUBLISHED = ROOT / "tests/benchmark/results/slides.csv"
 
 
 def difference(shots):
@@ -149,7 +152,8 @@ def measure(options, arguments):
     table = all_scenes()
     scenes = [table[name] for name in options.scenes.split(",") if name in table]
     program = ROOT / "build/release/native/pharos-cli"
-    meta = {"date": machine.today(), "command": shlex.join(["tests/benchmark/slides", *arguments]),
+    meta = {"date": machine.today(), "command": shlex.join(
+                ["tests/benchmark/slides", *(a for a in arguments if a not in UNTOLD)]),
             "machine": machine.processor(), "threads": options.threads,
             "versions": machine.versions({"pharos"}), "seeds": options.seeds, "window": WINDOW,
             "conditions": {"program": machine.content(program), "threads": options.threads,
@@ -168,6 +172,17 @@ def measure(options, arguments):
     return meta, journal.rows
 
 
+def publish(meta, rows):
+    """The CSV into the repository, and the README's part from it."""
+    kept = {key: value for key, value in meta.items() if key != "conditions"}
+    results.write(PUBLISHED, kept, rows)
+    path = ROOT / "README.md"
+    part = slides_page.readme_section(*results.read(PUBLISHED))
+    text = readme.replaced(path.read_text(encoding="utf-8"), part, slides_page.BEGIN,
+                           slides_page.END)
+    path.write_text(text, encoding="utf-8")
+
+
 def main(arguments):
     parser = argparse.ArgumentParser(prog="tests/benchmark/slides", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -177,9 +192,14 @@ def main(arguments):
     parser.add_argument("--fresh", action="store_true", help="do not go on with what is there")
     parser.add_argument("--short", action="store_true", help="no long run, no crops")
     parser.add_argument("--from", dest="source", type=Path, metavar="CSV")
+    parser.add_argument("--publish", action="store_true",
+                        help="keep the CSV in tests/benchmark/results, write the README's part")
     options = parser.parse_args(arguments)
+    process.end_on_termination()
     meta, rows = results.read(options.source) if options.source else measure(options, arguments)
     print("\n".join(slides_page.text(meta, rows)))
+    if options.publish:
+        publish(meta, rows)
     path = OUT.with_suffix(".html")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(slides_page.make(meta, rows, OUT.with_name("slides_crops")), encoding="utf-8")

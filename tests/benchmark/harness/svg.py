@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 WIDTH, HEIGHT = 440, 300
 LEFT, RIGHT, TOP, BOTTOM = 58, 12, 14, 40
-COLOURS = ("#0b6e4f", "#8fb339", "#c8553d", "#e3a857", "#3f5fa8", "#8a5a9e", "#5f6b73")
+GRID = 'stroke="#e6e2d8"'
+TICK = 'font-size="10.5" fill="#5f6b73"'
+TITLE = 'font-size="11.5" fill="#1d2327"'
+COLOURS = ("#8fb339", "#0b6e4f", "#c8553d", "#e3a857", "#3f5fa8", "#8a5a9e", "#5f6b73")
 
 
 @dataclass(frozen=True)
@@ -50,17 +53,17 @@ class _Axis:
 
 
 def _grid(x, y, x_title, y_title):
-    parts = [f'<line class="g" x1="{x(value):.1f}" x2="{x(value):.1f}" y1="{TOP}" '
-             f'y2="{HEIGHT - BOTTOM}"/><text class="t" x="{x(value):.1f}" '
+    parts = [f'<line {GRID} x1="{x(value):.1f}" x2="{x(value):.1f}" y1="{TOP}" '
+             f'y2="{HEIGHT - BOTTOM}"/><text {TICK} x="{x(value):.1f}" '
              f'y="{HEIGHT - BOTTOM + 14}" text-anchor="middle">{_label(value)}</text>'
              for value in x.ticks()]
-    parts += [f'<line class="g" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" '
-              f'y2="{y(value):.1f}"/><text class="t" x="{LEFT - 5}" '
+    parts += [f'<line {GRID} x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" '
+              f'y2="{y(value):.1f}"/><text {TICK} x="{LEFT - 5}" '
               f'y="{y(value) + 3.5:.1f}" text-anchor="end">{_label(value)}</text>'
               for value in y.ticks()]
     middle = (TOP + HEIGHT - BOTTOM) / 2
-    parts.append(f'<text class="a" x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 8}" '
-                 f'text-anchor="middle">{x_title}</text><text class="a" x="13" y="{middle}" '
+    parts.append(f'<text {TITLE} x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 8}" '
+                 f'text-anchor="middle">{x_title}</text><text {TITLE} x="13" y="{middle}" '
                  f'text-anchor="middle" transform="rotate(-90 13 {middle})">{y_title}</text>')
     return parts
 
