@@ -9,9 +9,9 @@ bl_info = {
     "category": "Render",
 }
 
-from . import checkpoints, engine, handlers, operators, panels, properties  # noqa: E402
+from . import checkpoints, compare, engine, handlers, operators, panels, properties  # noqa: E402
 
-_PARTS = (properties, engine, operators, panels, handlers, checkpoints)
+_PARTS = (properties, engine, operators, panels, compare, handlers, checkpoints)
 
 
 def register():
