@@ -85,6 +85,13 @@ void write_picture(const RenderSession& session, const std::string& path) {
         }
         passes.push_back({film_pass_info(pass).name, film_pass_info(pass).channels, buffer});
     }
+    for (std::size_t i = 0; i < session.aovs().size(); ++i) {
+        const AovDescription& aov = session.aovs()[i];
+        auto& buffer = buffers.emplace_back(pixels * (aov.color ? 4 : 1));
+        if (session.read_aov(i, buffer)) {
+            passes.push_back({aov.name, aov_channels(aov), buffer});
+        }
+    }
     const ExrOptions options{
         false,
         {{"pharos:samples", std::to_string(session.progress().samples)}, {"Software", "Pharos"}}};

@@ -92,6 +92,10 @@ class RenderSession {
     // Throws std::invalid_argument for a wrong size.
     bool read(FilmPass pass, std::span<float> out) const;
 
+    // The passes that materials write, and their newest state: 4 or 1 floats a pixel. As read().
+    [[nodiscard]] std::span<const AovDescription> aovs() const;
+    bool read_aov(std::size_t index, std::span<float> out) const;
+
   private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
