@@ -22,6 +22,10 @@ class SceneReport {
         entries_.push_back({severity, std::move(object), std::move(message)});
     }
 
+    void add(const SceneReport& other) {
+        entries_.insert(entries_.end(), other.entries_.begin(), other.entries_.end());
+    }
+
     [[nodiscard]] const std::vector<ReportEntry>& entries() const { return entries_; }
 
   private:

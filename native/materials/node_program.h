@@ -305,6 +305,8 @@ struct NodeOp {
     // Operations that say where the hit is may look this many pixels' footprints beside it, along
     // two axes in the surface: bump mapping compares heights.
     Vec2 step{0.0f};
+
+    bool operator==(const NodeOp&) const = default;
 };
 
 enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectangular, MirrorBall };
@@ -315,6 +317,8 @@ struct ImageUse {
     ImageExtension extension = ImageExtension::Repeat;
     ImageProjection projection = ImageProjection::Flat;
     float projection_blend = 0.0f;
+
+    bool operator==(const ImageUse&) const = default;
 };
 
 struct NodeProgram {
@@ -325,6 +329,8 @@ struct NodeProgram {
     std::vector<std::string> names;          // UV maps and attributes referred to by ops
     std::vector<std::vector<float>> tables;  // RGBA rows
     std::uint32_t register_count = 0;
+
+    bool operator==(const NodeProgram&) const = default;
 };
 
 // Operand order of the two Principled versions after weight:3 (name:size in one place for both

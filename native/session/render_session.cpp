@@ -82,7 +82,8 @@ struct RenderSession::Impl {
     std::jthread driver;
 
     void run(SceneDescription description);
-    void render(const Scene& scene);
+    void run_built(const Scene& scene, GuideController& guide);
+    void render(const Scene& scene, GuideController* kept_guide);
     void learn(GuideController& guide,
                Integrator& integrator,
                const BatchStatistics& before,
@@ -121,7 +122,7 @@ void RenderSession::Impl::run(SceneDescription description) {
             report = build_report;
             statistics.build_seconds = seconds_since(begin);
         }
-        render(*scene);
+        render(*scene, nullptr);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const Cancelled&) {
         end(SessionState::Cancelled, {});
@@ -132,7 +133,21 @@ void RenderSession::Impl::run(SceneDescription description) {
     }
 }
 
-void RenderSession::Impl::render(const Scene& scene) {
+void RenderSession::Impl::run_built(const Scene& scene, GuideController& guide) {
+    const FloatStateGuard float_state;
+    try {
+        if (const std::string problem = fatal_problem(scene.description); !problem.empty()) {
+            end(SessionState::Failed, problem);
+            return;
+        }
+        render(scene, &guide);
+        end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
+    } catch (const std::exception& error) {
+        end(SessionState::Failed, error.what());
+    }
+}
+
+void RenderSession::Impl::render(const Scene& scene, GuideController* kept_guide) {
     const RenderSettings& settings = scene.description.settings;
     ThreadPool pool(threads);
     Integrator integrator(scene, pool);
@@ -151,12 +166,15 @@ void RenderSession::Impl::render(const Scene& scene) {
     }
     const double cpu_begin = process_cpu_seconds();
     StopCondition stop{cancel, std::nullopt};
-    GuideController guide(settings.guiding, scene.bounds, pixels);
+    std::optional<GuideController> own_guide;
+    GuideController& guide = kept_guide != nullptr
+                                 ? *kept_guide
+                                 : own_guide.emplace(settings.guiding, scene.bounds, pixels);
     std::uint32_t done = 0;
     while (done < settings.samples) {
         PassSettings pass = next_pass(done, settings.samples, pixels);
         pass.samples = std::min(pass.samples, guide.most_samples(done));
-        pass.weight = guide.weights().of(done);
+        pass.weight = guide.weight(done);
         const BatchStatistics before = integrator.statistics();
         if (!integrator.render_pass(pass, guide.next_pass(), *shared_film, stop)) {
             finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
@@ -245,6 +263,16 @@ RenderSession::RenderSession(SceneDescription description,
     impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
         impl->run(std::move(scene));
     });
+}
+
+RenderSession::RenderSession(const Scene& scene, GuideController& guide, unsigned threads)
+    : impl_(std::make_unique<Impl>()) {
+    impl_->threads = threads;
+    impl_->width = scene.description.film.crop_width;
+    impl_->height = scene.description.film.crop_height;
+    impl_->passes = PassLayout(scene.description.passes.wanted);
+    impl_->driver =
+        std::jthread([impl = impl_.get(), &scene, &guide] { impl->run_built(scene, guide); });
 }
 
 RenderSession::~RenderSession() {

@@ -19,6 +19,8 @@
 
 namespace pharos {
 
+struct Scene;
+
 enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelled, Failed };
 
 struct SessionProgress {
@@ -67,6 +69,10 @@ class RenderSession {
     explicit RenderSession(SceneDescription description,
                            unsigned threads = 0,
                            std::vector<std::uint32_t> snapshot_samples = {});
+
+    // Renders a scene that is built already, with a guide that may have learned from earlier
+    // pictures. Both belong to the session until it has ended.
+    RenderSession(const Scene& scene, class GuideController& guide, unsigned threads);
     ~RenderSession();
     RenderSession(const RenderSession&) = delete;
     RenderSession& operator=(const RenderSession&) = delete;
