@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from .library import digest, file_state
+
 _DATA_SPACES = {"Non-Color", "Raw", "Generic Data", "Non-Colour Data"}
 _LINEAR_SPACES = {
     "Linear",
@@ -59,10 +61,11 @@ def _file_path(image, user) -> str:
 class ImageTable:
     """Images of one description, each added once."""
 
-    def __init__(self, native, description, report):
+    def __init__(self, native, description, report, library=None):
         self._native = native
         self._description = description
         self._report = report
+        self._library = library
         self._indices: dict[tuple, int] = {}
 
     def index(self, image, user=None) -> int:
@@ -75,7 +78,6 @@ class ImageTable:
         return self._indices[key]
 
     def _add(self, image, user) -> int:
-        fields = {"name": image.name}
         space, exact = color_space(image.colorspace_settings.name)
         alpha = _ALPHA[image.alpha_mode]
         if not exact:
@@ -84,21 +86,40 @@ class ImageTable:
         if image.source in {"TILED", "SEQUENCE", "MOVIE"}:
             kind = {"TILED": "tiles", "SEQUENCE": "sequence", "MOVIE": "movie"}[image.source]
             self._report.warn(image.name, f"One picture of this {kind} is used.")
-        if self._lives_in_blender(image):
-            fields["pixels"] = _pixels(image)
-            if image.is_float:
-                # Blender holds such pixels scene-linear and multiplied by alpha.
-                space = space if space == "Data" else "Linear"
-                alpha = alpha if alpha in {"ChannelPacked", "None_"} else "Premultiplied"
-        elif image.packed_file is not None:
-            fields["data"] = image.packed_file.data
-        else:
-            fields["path"] = _file_path(image, user)
+        in_blender = self._lives_in_blender(image)
+        if in_blender and image.is_float:
+            # Blender holds such pixels scene-linear and multiplied by alpha.
+            space = space if space == "Data" else "Linear"
+            alpha = alpha if alpha in {"ChannelPacked", "None_"} else "Premultiplied"
+        path = _file_path(image, user)
+        place = None if self._library is None else self._library.image_place(image, path)
+        version = None if place is None else self._library.images.at(place)
+        if version is not None:
+            return self._description.add_kept_image(image.name, version)
+        content = self._content(image, path, in_blender)
+        if self._library is not None and content:
+            parts = [image.name_full, space, alpha, *content.items(), file_state(path)]
+            version, known = self._library.images.of(digest(parts), place)
+            if known:
+                return self._description.add_kept_image(image.name, version)
         return self._description.add_image(
+            name=image.name,
             color_space=getattr(self._native.ImageColorSpace, space),
             alpha=getattr(self._native.ImageAlpha, alpha),
-            **fields,
+            version=version or 0,
+            **content,
         )
+
+    @staticmethod
+    def _content(image, path: str, in_blender: bool) -> dict:
+        """The one of pixels, data and path that holds what Blender would render; {}: none does."""
+        if in_blender:
+            found = {"pixels": _pixels(image)}
+        elif image.packed_file is not None:
+            found = {"data": image.packed_file.data}
+        else:
+            found = {"path": path or None}
+        return {name: value for name, value in found.items() if value is not None}
 
     @staticmethod
     def _lives_in_blender(image) -> bool:
