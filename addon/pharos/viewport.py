@@ -24,6 +24,8 @@ _SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
 _LONGEST_INTERVAL = 0.5
 _DRAWING_SHARE = 0.25  # most of the time may go into rendering, not into showing it
 
+_open: weakref.WeakSet = weakref.WeakSet()  # viewports that may be found by their area
+
 
 class Viewport:
     """One viewport of one engine object; close() may be called at any time, also twice."""
@@ -42,7 +44,12 @@ class Viewport:
         self._texture = None
         self._paused = False  # a final render has the processor
         self._interval = _SHORTEST_INTERVAL
+        _open.add(self)
         self._start_timer()
+
+    @property
+    def area(self) -> int | None:
+        return self._area
 
     @property
     def session(self):
@@ -163,6 +170,12 @@ class Viewport:
             for area in window.screen.areas:
                 if area.type == "VIEW_3D" and self._area in (None, area.as_pointer()):
                     area.tag_redraw()
+
+
+def viewport_of(area) -> Viewport | None:
+    """The viewport that an area shows, if it is one of ours."""
+    pointer = area.as_pointer()
+    return next((v for v in _open if v.session is not None and v.area == pointer), None)
 
 
 def live_line(progress) -> str:
