@@ -22,6 +22,31 @@ struct FreeDelete {
     }
 };
 
+void bind_lobes(py::module_& m) {
+    py::class_<GuideLobe>(m, "GuideLobe", py::module_local())
+        .def_property_readonly("direction",
+                               [](const GuideLobe& lobe) {
+                                   return py::make_tuple(
+                                       lobe.direction.x, lobe.direction.y, lobe.direction.z);
+                               })
+        .def_readonly("kappa", &GuideLobe::kappa)
+        .def_readonly("weight", &GuideLobe::weight);
+    py::class_<LobeProbe>(m, "LobeProbe", py::module_local())
+        .def_readonly("question", &LobeProbe::question)
+        .def_readonly("hit", &LobeProbe::hit)
+        .def_property_readonly("position",
+                               [](const LobeProbe& probe) {
+                                   const Vec3& p = probe.position;
+                                   return py::make_tuple(p.x, p.y, p.z);
+                               })
+        .def_readonly("irradiance", &LobeProbe::irradiance)
+        .def_readonly("diffuse_share", &LobeProbe::diffuse_share)
+        .def_readonly("glossy_share", &LobeProbe::glossy_share)
+        .def_property_readonly("why_unguided",
+                               [](const LobeProbe& probe) { return why_unguided(probe.state); })
+        .def_readonly("lobes", &LobeProbe::lobes);
+}
+
 // (pixels of height x width x 4 with the bottom row first, serial), or None while there is nothing.
 py::object picture(const LiveSession& session) {
     LivePicture picture;
@@ -42,6 +67,7 @@ py::object picture(const LiveSession& session) {
 }  // namespace
 
 void bind_live(py::module_& m) {
+    bind_lobes(m);
     py::class_<LiveProgress>(m, "LiveProgress", py::module_local())
         .def_readonly("render", &LiveProgress::render)
         .def_readonly("pictures", &LiveProgress::pictures)
@@ -74,6 +100,14 @@ void bind_live(py::module_& m) {
         .def("statistics", &LiveSession::statistics, FreeGuard())
         .def("report", &LiveSession::report, FreeGuard())
         .def("picture", &picture, FloatGuard())
+        .def(
+            "ask_lobes",
+            [](LiveSession& session, float x, float y) { return session.ask_lobes(Vec2(x, y)); },
+            FreeGuard(),
+            py::arg("x"),
+            py::arg("y"),
+            "At a place in fractions of the view, from its bottom left.")
+        .def("lobes", &LiveSession::lobes, FreeGuard())
         .def(
             "wait",
             [](const LiveSession& session, double seconds) {

@@ -15,5 +15,6 @@ class UsageError : public std::runtime_error {
 
 int render(const std::vector<std::string>& arguments);
 int field(const std::vector<std::string>& arguments);
+int adapt(const std::vector<std::string>& arguments);
 
 }  // namespace pharos::cli

@@ -31,6 +31,14 @@ constexpr const char* kUsage =
     "  --save FILE        write the weights\n"
     "  --height N         rows of each picture (default: 64)\n"
     "  --rays N           paths into each direction (default: 64)\n"
+    "       pharos-cli adapt FILE --move X,Y,Z [options]\n"
+    "  error of every frame after a lamp has moved: guide kept, from nothing, without\n"
+    "  --lamp NAME        default: the first\n"
+    "  --frames N         after the move (default: 24)\n"
+    "  --learned N        frames before it (default: 64)\n"
+    "  --reference N      samples of the reference (default: 256)\n"
+    "  --size W,H         of the picture (default: the file's)\n"
+    "  --seed, --threads, --nee as above\n"
     "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write "
     "OUT)\n";
 
@@ -52,6 +60,9 @@ int main(int argc, char** argv) {
         }
         if (arguments[0] == "field") {
             return pharos::cli::field({arguments.begin() + 1, arguments.end()});
+        }
+        if (arguments[0] == "adapt") {
+            return pharos::cli::adapt({arguments.begin() + 1, arguments.end()});
         }
         std::fprintf(stderr, "pharos-cli: unknown command '%s'\n%s", arguments[0].c_str(), kUsage);
         return 2;

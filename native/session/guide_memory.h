@@ -18,6 +18,8 @@ class GuideMemory {
     // The next picture starts with a new guide.
     void forget() { guide_.reset(); }
 
+    [[nodiscard]] const GuideController* current() const { return guide_ ? &*guide_ : nullptr; }
+
     // Whether the last begin_picture() went on with what earlier pictures had learned.
     [[nodiscard]] bool kept() const { return kept_; }
 

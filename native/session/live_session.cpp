@@ -8,6 +8,8 @@
 #include <thread>
 #include <utility>
 
+#include <sys/resource.h>
+
 #include "core/cancel.h"
 #include "core/fp_state.h"
 #include "scene/compare.h"
@@ -20,6 +22,7 @@ namespace pharos {
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval(2);
+constexpr int kNiceness = 5;  // the host's interface comes first
 
 // Content that only the description before holds moves on into the next one.
 void adopt_content(SceneDescription& from, SceneDescription& next) {
@@ -71,6 +74,9 @@ struct LiveSession::Impl {
     std::vector<ReportEntry> report;
     std::shared_ptr<RenderSession> coarse;  // of the newest view; null: none
     std::shared_ptr<RenderSession> full;
+    std::uint64_t questions = 0;
+    std::optional<Vec2> question;
+    LobeProbe answer;
 
     // Of the driver alone.
     LiveScene scene;
@@ -88,6 +94,7 @@ struct LiveSession::Impl {
     void start(GuideController& controller, std::shared_ptr<RenderSession>& place);
     [[nodiscard]] bool finish(RenderSession& session);
     void fail(const std::string& error);
+    void answer_lobes(const GuideController& controller);
 
     [[nodiscard]] bool interrupted() const {
         return closing.cancelled() || paused || requests.any();
@@ -153,9 +160,30 @@ bool LiveSession::Impl::finish(RenderSession& session) {
 }
 
 void LiveSession::Impl::start(GuideController& controller, std::shared_ptr<RenderSession>& place) {
-    auto session = std::make_shared<RenderSession>(*scene.scene(), controller, threads);
+    const bool guided = &controller != &no_guide;
+    const auto answer_between = [this](const GuideController& learned) { answer_lobes(learned); };
+    const BuiltScene built{*scene.scene(),
+                           controller,
+                           guided ? answer_between : std::function<void(const GuideController&)>()};
+    auto session = std::make_shared<RenderSession>(built, threads);
     const std::lock_guard lock(mutex);
     place = std::move(session);
+}
+
+// On the thread that the guide belongs to.
+void LiveSession::Impl::answer_lobes(const GuideController& controller) {
+    std::unique_lock lock(mutex);
+    if (!question) {
+        return;
+    }
+    const Vec2 place = *question;
+    const std::uint64_t number = questions;
+    question.reset();
+    lock.unlock();
+    LobeProbe found = probe_lobes(*scene.scene(), controller, place);
+    found.question = number;
+    lock.lock();
+    answer = std::move(found);
 }
 
 // What was shown belongs to an earlier view or scene.
@@ -195,6 +223,8 @@ void LiveSession::Impl::render() {
 
 void LiveSession::Impl::run() {
     const FloatStateGuard float_state;
+    // Of this thread, and of all that it starts; a refusal does no harm.
+    setpriority(PRIO_PROCESS, 0, kNiceness);
     std::unique_lock lock(mutex);
     while (true) {
         busy = false;
@@ -210,6 +240,9 @@ void LiveSession::Impl::run() {
         lock.unlock();
         if (now.any() || now.forget_guide) {
             take_up(std::move(now));
+        }
+        if (guide.current() != nullptr && scene.scene() != nullptr) {
+            answer_lobes(*guide.current());
         }
         if (waiting && !hold) {
             try {
@@ -277,6 +310,18 @@ void LiveSession::set_paused(bool paused) {
 void LiveSession::forget_guide() {
     const std::lock_guard lock(impl_->mutex);
     impl_->requests.forget_guide = true;
+}
+
+std::uint64_t LiveSession::ask_lobes(const Vec2& place) {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->question = place;
+    impl_->changed.notify_all();
+    return ++impl_->questions;
+}
+
+LobeProbe LiveSession::lobes() const {
+    const std::lock_guard lock(impl_->mutex);
+    return impl_->answer;
 }
 
 LiveProgress LiveSession::progress() const {

@@ -13,6 +13,7 @@
 
 #include "scene/live_scene.h"
 #include "session/coarse_view.h"
+#include "session/lobe_probe.h"
 #include "session/render_session.h"
 
 namespace pharos {
@@ -48,6 +49,11 @@ class LiveSession {
 
     // The best there is to show of the newest view; empty until something of it is there.
     [[nodiscard]] LivePicture picture() const;
+
+    // Asks what the guide believes at a place of the view, fractions from its bottom left; the
+    // answer comes between two passes. Returns the question's number.
+    std::uint64_t ask_lobes(const Vec2& place);
+    [[nodiscard]] LobeProbe lobes() const;  // the last answer
 
     // True when every change has been taken up and the picture has ended, within the time.
     bool wait(std::chrono::milliseconds time) const;

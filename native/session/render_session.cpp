@@ -82,8 +82,8 @@ struct RenderSession::Impl {
     std::jthread driver;
 
     void run(SceneDescription description);
-    void run_built(const Scene& scene, GuideController& guide);
-    void render(const Scene& scene, GuideController* kept_guide);
+    void run_built(const BuiltScene& built);
+    void render(const Scene& scene, const BuiltScene* built);
     void learn(GuideController& guide,
                Integrator& integrator,
                const BatchStatistics& before,
@@ -133,21 +133,21 @@ void RenderSession::Impl::run(SceneDescription description) {
     }
 }
 
-void RenderSession::Impl::run_built(const Scene& scene, GuideController& guide) {
+void RenderSession::Impl::run_built(const BuiltScene& built) {
     const FloatStateGuard float_state;
     try {
-        if (const std::string problem = fatal_problem(scene.description); !problem.empty()) {
+        if (const std::string problem = fatal_problem(built.scene.description); !problem.empty()) {
             end(SessionState::Failed, problem);
             return;
         }
-        render(scene, &guide);
+        render(built.scene, &built);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const std::exception& error) {
         end(SessionState::Failed, error.what());
     }
 }
 
-void RenderSession::Impl::render(const Scene& scene, GuideController* kept_guide) {
+void RenderSession::Impl::render(const Scene& scene, const BuiltScene* built) {
     const RenderSettings& settings = scene.description.settings;
     ThreadPool pool(threads);
     Integrator integrator(scene, pool);
@@ -167,9 +167,8 @@ void RenderSession::Impl::render(const Scene& scene, GuideController* kept_guide
     const double cpu_begin = process_cpu_seconds();
     StopCondition stop{cancel, std::nullopt};
     std::optional<GuideController> own_guide;
-    GuideController& guide = kept_guide != nullptr
-                                 ? *kept_guide
-                                 : own_guide.emplace(settings.guiding, scene.bounds, pixels);
+    GuideController& guide =
+        built != nullptr ? built->guide : own_guide.emplace(settings.guiding, scene.bounds, pixels);
     std::uint32_t done = 0;
     while (done < settings.samples) {
         PassSettings pass = next_pass(done, settings.samples, pixels);
@@ -184,6 +183,9 @@ void RenderSession::Impl::render(const Scene& scene, GuideController* kept_guide
         guide.see(shared_film->film, done);
         learn(guide, integrator, before, pool);
         finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
+        if (built != nullptr && built->after_pass) {
+            built->after_pass(guide);
+        }
         if (settings.time_limit > 0.0f) {
             // Only after the first pass: every pixel has a sample by then.
             stop.deadline = begin + std::chrono::duration_cast<Clock::duration>(
@@ -265,14 +267,14 @@ RenderSession::RenderSession(SceneDescription description,
     });
 }
 
-RenderSession::RenderSession(const Scene& scene, GuideController& guide, unsigned threads)
+RenderSession::RenderSession(const BuiltScene& built, unsigned threads)
     : impl_(std::make_unique<Impl>()) {
+    const SceneDescription& description = built.scene.description;
     impl_->threads = threads;
-    impl_->width = scene.description.film.crop_width;
-    impl_->height = scene.description.film.crop_height;
-    impl_->passes = PassLayout(scene.description.passes.wanted);
-    impl_->driver =
-        std::jthread([impl = impl_.get(), &scene, &guide] { impl->run_built(scene, guide); });
+    impl_->width = description.film.crop_width;
+    impl_->height = description.film.crop_height;
+    impl_->passes = PassLayout(description.passes.wanted);
+    impl_->driver = std::jthread([impl = impl_.get(), built] { impl->run_built(built); });
 }
 
 RenderSession::~RenderSession() {

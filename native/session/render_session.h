@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@
 
 namespace pharos {
 
+class GuideController;
 struct Scene;
 
 enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelled, Failed };
@@ -61,6 +63,15 @@ struct SessionSnapshot {
     std::vector<float> combined;  // RGBA
 };
 
+// A scene that is built already, and a guide that may have learned from earlier pictures. Both
+// belong to the session until it has ended.
+struct BuiltScene {
+    const Scene& scene;
+    GuideController& guide;
+    std::function<void(const GuideController&)>
+        after_pass;  // on the session's thread; may be empty
+};
+
 class RenderSession {
   public:
     // Takes the description; work begins at once on threads of the session. threads 0: one per
@@ -70,9 +81,8 @@ class RenderSession {
                            unsigned threads = 0,
                            std::vector<std::uint32_t> snapshot_samples = {});
 
-    // Renders a scene that is built already, with a guide that may have learned from earlier
-    // pictures. Both belong to the session until it has ended.
-    RenderSession(const Scene& scene, class GuideController& guide, unsigned threads);
+    // Renders a scene that is built already.
+    RenderSession(const BuiltScene& built, unsigned threads);
     ~RenderSession();
     RenderSession(const RenderSession&) = delete;
     RenderSession& operator=(const RenderSession&) = delete;

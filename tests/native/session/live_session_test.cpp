@@ -210,6 +210,31 @@ TEST(LiveSession, TheGuideLivesOnUntilItIsForgotten) {
     EXPECT_FALSE(session.progress().guide_kept);
 }
 
+TEST(LiveSession, LobesAreToldWhileItRendersAndAfterwards) {
+    LiveSession session(2);
+    SceneDescription description = versioned_rooms(6);
+    description.settings.guiding = GuidingMode::Neural;
+    session.set_scene(std::move(description));
+    const std::uint64_t early = session.ask_lobes(Vec2(0.5f, 0.2f));
+    static_cast<void>(finished(session));
+    EXPECT_EQ(session.lobes().question, early);
+    const std::uint64_t late = session.ask_lobes(Vec2(0.5f, 0.2f));
+    while (session.lobes().question != late) {
+        session.wait(std::chrono::milliseconds(1));
+    }
+    const LobeProbe probe = session.lobes();
+    ASSERT_TRUE(probe.hit);
+    ASSERT_FALSE(probe.lobes.empty());
+    float weight = 0.0f;
+    for (const GuideLobe& lobe : probe.lobes) {
+        EXPECT_NEAR(glm::length(lobe.direction), 1.0f, 1e-4f);
+        EXPECT_LE(lobe.weight, probe.lobes.front().weight);
+        weight += lobe.weight;
+    }
+    EXPECT_NEAR(weight, 1.0f, 1e-4f);
+    EXPECT_GT(probe.irradiance, 0.0f);
+}
+
 TEST(LiveSession, ChangesInARushShowTheLast) {
     const LivePicture expected = fresh(versioned_rooms(2));
     LiveSession session(2);
