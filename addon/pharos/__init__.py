@@ -9,9 +9,9 @@ bl_info = {
     "category": "Render",
 }
 
-from . import engine, handlers, operators, panels, properties  # noqa: E402
+from . import checkpoints, engine, handlers, lobes, operators, panels, properties  # noqa: E402
 
-_PARTS = (properties, engine, operators, panels, handlers)
+_PARTS = (properties, engine, operators, lobes, panels, handlers, checkpoints)
 
 
 def register():

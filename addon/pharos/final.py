@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import bpy
 
-from . import compat, handlers, operators, output
+from . import checkpoints, compat, handlers, operators, output
 from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
@@ -78,7 +78,7 @@ class FinalRender:
             if description is not None and not operators.take_dump(
                 self._native, description, self._scene, self._layer
             ):
-                self._render(description, result)
+                self._render(description, result, view_name)
         except Cancelled:
             self._cancelled = True
         finally:
@@ -115,8 +115,18 @@ class FinalRender:
         render = self._scene.render
         return render.threads if render.threads_mode == "FIXED" else 0
 
-    def _render(self, description, result) -> None:
-        session = self._native.RenderSession(description, self._threads())
+    def _checkpoint(self, view_name: str) -> str:
+        if self._engine.is_preview:
+            return ""
+        return checkpoints.path_for(self._scene, self._layer.name, view_name)
+
+    def _render(self, description, result, view_name: str) -> None:
+        session = self._native.RenderSession(
+            description,
+            self._threads(),
+            self._checkpoint(view_name),
+            60.0 * self._scene.pharos.checkpoint_interval,
+        )
         try:
             self._poll(session, result)
             self._show_result(session, result)

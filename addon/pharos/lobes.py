@@ -1,8 +1,8 @@
 """Live lobes: what the guide believes at the point under a click, drawn into the viewport.
 
-Each lobe is an arrow along the mean direction of the light it stands for, as long as its share of
-the whole, with kappa beside it; a line of text says how far the guide is trusted there, or why it is
-off.
+Each lobe is an arrow along the mean direction of the light it stands for, the longer the larger its
+share, with kappa and share beside it; a line of text says how far the guide is trusted there, or
+why it is off.
 """
 
 from __future__ import annotations
@@ -106,7 +106,10 @@ def _draw_words(shown: _Overlay) -> None:
     region, data = bpy.context.region, bpy.context.region_data
     if shown.probe.hit:
         for _, end, lobe in shown.arrows():
-            _write(location_3d_to_region_2d(region, data, end), f"κ {lobe.kappa:.3g}")
+            _write(
+                location_3d_to_region_2d(region, data, end),
+                f"κ {lobe.kappa:.3g}, {100 * lobe.weight:.0f} %",
+            )
         place = location_3d_to_region_2d(region, data, Vector(shown.probe.position))
     else:
         place = Vector((0.5 * region.width, 0.5 * region.height))

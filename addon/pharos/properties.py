@@ -75,6 +75,12 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
     preview_samples: _samples(
         "Viewport Samples", "Samples of each pixel in the viewport; 0 goes on without end", 1024, 0
     )
+    use_preview_denoising: BoolProperty(
+        name="Denoise Viewport",
+        description="Show the viewport's picture without its noise, by the library that comes with "
+        "Blender. The samples stay as they are",
+        default=False,
+    )
     seed: IntProperty(
         name="Seed",
         description="Another seed gives other noise; the same seed gives the same picture",
@@ -164,6 +170,19 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         name="Follow Cycles",
         description="Take samples, seed, bounces and film from the scene's Cycles settings",
         default=False,
+    )
+    use_checkpoint: BoolProperty(
+        name="Checkpoints",
+        description="Keep a final render beside its picture while it is under way. When Blender is "
+        "stopped, rendering the frame again goes on where it was, to the same picture",
+        default=False,
+    )
+    checkpoint_interval: FloatProperty(
+        name="Interval",
+        description="Minutes between two checkpoints; one more is written when a render is stopped",
+        default=5.0,
+        min=0.05,
+        soft_max=60.0,
     )
     report: CollectionProperty(
         name="Report",

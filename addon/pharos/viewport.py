@@ -12,7 +12,7 @@ import weakref
 
 import bpy
 
-from . import compat, handlers
+from . import compat, denoise, handlers
 from .export.library import Library
 from .export.report import Report
 from .export.scene import export_scene, set_view
@@ -42,6 +42,8 @@ class Viewport:
         self._drawn = None  # serial and crop of the texture
         self._picture = None
         self._texture = None
+        self._denoiser = None
+        self._denoised = 0  # number of the picture that was shown without noise
         self._paused = False  # a final render has the processor
         self._interval = _SHORTEST_INTERVAL
         _open.add(self)
@@ -50,6 +52,11 @@ class Viewport:
     @property
     def area(self) -> int | None:
         return self._area
+
+    @property
+    def crop(self):
+        """The part of the region that is rendered."""
+        return self._crop
 
     @property
     def session(self):
@@ -85,6 +92,8 @@ class Viewport:
     def has_news(self) -> bool:
         if self._session is None:
             return False
+        if self._denoiser is not None and self._denoiser.is_ready:
+            return True
         serial = self._session.progress().render.serial
         return self._drawn is None or serial != self._drawn[0]
 
@@ -108,6 +117,7 @@ class Viewport:
         self._set_view(view, state, depsgraph)
         self._session.set_view(view)
         self._crop = state.crop
+        self._choose_denoiser(depsgraph.scene)
         self._update_texture()
         self._draw_texture(engine, context, depsgraph)
         progress = self._session.progress()
@@ -121,21 +131,43 @@ class Viewport:
         set_view(self._native, description, scene, state.view())
         description.set_settings(samples=viewport_samples(scene), time_limit=0.0)
 
-    def _update_texture(self) -> None:
-        import gpu  # not there in background mode of newer versions
+    def _choose_denoiser(self, scene) -> None:
+        oidn = denoise.load().oidn if scene.pharos.use_preview_denoising else None
+        if oidn is None:
+            self._denoiser, self._denoised = None, 0
+        elif self._denoiser is None:
+            self._denoiser = denoise.Denoiser(oidn)
+            self._drawn = None
 
+    def _update_texture(self) -> None:
         if not self.has_news():
             return
+        progress = self._session.progress()
+        if self._denoiser is not None and (done := self._denoiser.take()) is not None:
+            pixels, picture = done
+            if picture == progress.pictures:
+                self._show(pixels)
+                self._denoised = picture
         found = self._session.picture()
         if found is None:
             return  # the last picture looks better than nothing
         pixels, serial = found
+        if self._denoiser is not None and progress.render.samples > 0:
+            if self._denoiser.busy:
+                return  # this one, or what it has become, is taken when the thread is free
+            self._denoiser.start(pixels, progress.pictures)
+        self._drawn = serial, self._crop
+        if self._denoised != progress.pictures:
+            self._show(pixels)
+
+    def _show(self, pixels) -> None:
+        import gpu  # not there in background mode of newer versions
+
         height, width = pixels.shape[:2]
         # The buffer refers to the array: both live as long as the texture.
         self._picture = pixels
         buffer = gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
         self._texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)
-        self._drawn = (serial, self._crop)
 
     def _draw_texture(self, engine, context, depsgraph) -> None:
         """The last picture there is, stretched while a new size has none yet."""

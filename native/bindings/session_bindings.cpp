@@ -47,6 +47,7 @@ void bind_results(py::module_& m) {
     py::class_<SessionProgress>(m, "SessionProgress", py::module_local())
         .def_readonly("state", &SessionProgress::state)
         .def_readonly("error", &SessionProgress::error)
+        .def_readonly("out_of_memory", &SessionProgress::out_of_memory)
         .def_readonly("samples", &SessionProgress::samples)
         .def_readonly("total_samples", &SessionProgress::total_samples)
         .def_readonly("serial", &SessionProgress::serial)
@@ -71,7 +72,8 @@ void bind_results(py::module_& m) {
     py::class_<ReportEntry>(m, "ReportEntry", py::module_local())
         .def_readonly("severity", &ReportEntry::severity)
         .def_readonly("object", &ReportEntry::object)
-        .def_readonly("message", &ReportEntry::message);
+        .def_readonly("message", &ReportEntry::message)
+        .def_readonly("missing", &ReportEntry::missing);
 }
 
 using PixelArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
@@ -118,14 +120,24 @@ void bind_session(py::module_& m) {
           "Passes are (name, channel letters, pixels with the bottom row first).");
     using Holder = std::unique_ptr<RenderSession, FreeDelete>;
     py::class_<RenderSession, Holder>(m, "RenderSession", py::module_local())
-        .def(py::init([](SceneDescription& description, unsigned threads) {
-                 const py::gil_scoped_release release;
-                 return Holder(new RenderSession(std::move(description), threads));
-             }),
-             FloatGuard(),
-             py::arg("description"),
-             py::arg("threads") = 0,
-             "Takes the description over: it is empty afterwards.")
+        .def(
+            py::init([](SceneDescription& description,
+                        unsigned threads,
+                        const std::string& checkpoint,
+                        double interval) {
+                const py::gil_scoped_release release;
+                SessionOptions options;
+                options.threads = threads;
+                options.checkpoint = {checkpoint, interval, Resume::IfItFits};
+                return Holder(new RenderSession(std::move(description), std::move(options)));
+            }),
+            FloatGuard(),
+            py::arg("description"),
+            py::arg("threads") = 0,
+            py::arg("checkpoint") = "",
+            py::arg("checkpoint_interval") = 300.0,
+            "Takes the description over: it is empty afterwards. Goes on from the checkpoint where "
+            "it is one of this render.")
         .def("cancel", &RenderSession::cancel, FreeGuard())
         .def(
             "wait",

@@ -1,8 +1,6 @@
 // pharos-cli field: what the guide has learned at a pixel beside the light that is there.
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -56,25 +54,6 @@ Options parse(const std::vector<std::string>& arguments) {
     options.probe.threads = options.threads;
     options.probe.train = options.load.empty() || options.samples.has_value();
     return options;
-}
-
-std::vector<std::byte> read_bytes(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
-    if (!file || bytes.empty()) {
-        throw std::runtime_error(path + ": cannot be read");
-    }
-    const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
-    return {first, first + bytes.size()};
-}
-
-void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    file.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-    if (!file.flush()) {
-        throw std::runtime_error(path + ": cannot be written");
-    }
 }
 
 // Both pictures side by side, what was learned on the left.

@@ -2,10 +2,12 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <string>
 #include <vector>
 
 #include "cli/commands.h"
+#include "core/atomic_file.h"
 
 namespace {
 
@@ -19,9 +21,18 @@ constexpr const char* kUsage =
     "  --time-limit S     stop after S seconds\n"
     "  --passes A,B       passes beside the basic ones: names, all, guide or none (default: the "
     "file's)\n"
+    "  --sample-offset N  with --sample-count M: the samples N to N+M-1 of the picture, for merge\n"
+    "  --field FILE       guide by what another render has learned, and learn no more\n"
+    "  --save-field FILE  write what was learned\n"
+    "  --checkpoint FILE  keep the render in a file, every 300 seconds and at its end\n"
+    "  --checkpoint-interval S   every S seconds\n"
+    "  --resume           go on from that file, if it is there\n"
+    "  --strict           a missing image is an error\n"
     "  --snapshots A,B    also write OUT.A.exr, OUT.B.exr after that many samples\n"
     "  --stats            print work and time per stage\n"
     "  --stats-json FILE  write the same, with the snapshots' CPU seconds, as JSON\n"
+    "       pharos-cli merge A.exr B.exr ... -o OUT.exr\n"
+    "  pictures of --sample-offset and --sample-count to one, each pixel by its own samples\n"
     "       pharos-cli field FILE --pixel X,Y -o OUT.exr [options]\n"
     "  what the guide believes at a pixel's first hit (left) beside the light that is there "
     "(right),\n"
@@ -39,8 +50,18 @@ constexpr const char* kUsage =
     "  --reference N      samples of the reference (default: 256)\n"
     "  --size W,H         of the picture (default: the file's)\n"
     "  --seed, --threads, --nee as above\n"
-    "exit codes: 0 done, 1 error, 2 wrong arguments, 130 interrupted, 143 terminated (both write "
-    "OUT)\n";
+    "exit codes: 0 done, 1 error, 2 wrong arguments, 3 missing image (--strict), 4 out of memory,\n"
+    "5 not written, 130 interrupted, 143 terminated (both write OUT)\n";
+
+struct Command {
+    const char* name;
+    int (*run)(const std::vector<std::string>& arguments);
+};
+
+constexpr Command kCommands[] = {{"render", pharos::cli::render},
+                                 {"merge", pharos::cli::merge},
+                                 {"field", pharos::cli::field},
+                                 {"adapt", pharos::cli::adapt}};
 
 }  // namespace
 
@@ -54,23 +75,29 @@ int main(int argc, char** argv) {
         std::fputs(kUsage, arguments.empty() ? stderr : stdout);
         return arguments.empty() ? 2 : 0;
     }
+    const auto complain = [](const char* what) { std::fprintf(stderr, "pharos-cli: %s\n", what); };
     try {
-        if (arguments[0] == "render") {
-            return pharos::cli::render({arguments.begin() + 1, arguments.end()});
+        for (const Command& command : kCommands) {
+            if (arguments[0] == command.name) {
+                return command.run({arguments.begin() + 1, arguments.end()});
+            }
         }
-        if (arguments[0] == "field") {
-            return pharos::cli::field({arguments.begin() + 1, arguments.end()});
-        }
-        if (arguments[0] == "adapt") {
-            return pharos::cli::adapt({arguments.begin() + 1, arguments.end()});
-        }
-        std::fprintf(stderr, "pharos-cli: unknown command '%s'\n%s", arguments[0].c_str(), kUsage);
-        return 2;
+        throw pharos::cli::UsageError("unknown command '" + arguments[0] + "'");
     } catch (const pharos::cli::UsageError& error) {
-        std::fprintf(stderr, "pharos-cli: %s\n%s", error.what(), kUsage);
-        return 2;
+        complain(error.what());
+        std::fputs(kUsage, stderr);
+        return pharos::cli::kExitUsage;
+    } catch (const pharos::cli::MissingAsset& error) {
+        complain(error.what());
+        return pharos::cli::kExitMissingAsset;
+    } catch (const std::bad_alloc&) {
+        complain("out of memory: the scene does not fit");
+        return pharos::cli::kExitOutOfMemory;
+    } catch (const pharos::WriteError& error) {
+        complain(error.what());
+        return pharos::cli::kExitNotWritten;
     } catch (const std::exception& error) {
-        std::fprintf(stderr, "pharos-cli: %s\n", error.what());
-        return 1;
+        complain(error.what());
+        return pharos::cli::kExitError;
     }
 }

@@ -1,11 +1,22 @@
 #include "cli/options.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 
+#include "core/atomic_file.h"
 #include "film/passes.h"
 
 namespace pharos::cli {
+
+namespace {
+
+// In the order of GuidingMode.
+constexpr std::array<const char*, 4> kGuidingNames{"off", "neural", "slides", "slides-position"};
+
+}  // namespace
 
 std::vector<std::string> split(const std::string& text, char separator) {
     std::vector<std::string> parts;
@@ -37,19 +48,32 @@ GuidingMode parse_guiding(const std::string& text) {
     for (char& c : lower) {
         c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     }
-    if (lower == "off") {
-        return GuidingMode::Off;
-    }
-    if (lower == "neural") {
-        return GuidingMode::Neural;
-    }
-    if (lower == "slides") {
-        return GuidingMode::Slides;
-    }
-    if (lower == "slides-position") {
-        return GuidingMode::SlidesPosition;
+    for (std::size_t i = 0; i < kGuidingNames.size(); ++i) {
+        if (lower == kGuidingNames[i]) {
+            return static_cast<GuidingMode>(i);
+        }
     }
     throw UsageError("--guiding: '" + text + "' is none of off, neural, slides, slides-position");
+}
+
+const char* guiding_name(GuidingMode mode) {
+    return kGuidingNames[static_cast<std::size_t>(mode)];
+}
+
+std::vector<std::byte> read_bytes(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+    if (!file || bytes.empty()) {
+        throw std::runtime_error(path + ": cannot be read");
+    }
+    const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
+    return {first, first + bytes.size()};
+}
+
+void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
+    AtomicFile file(path);
+    file.write(bytes);
+    file.commit();
 }
 
 std::uint32_t parse_passes(const std::string& text) {

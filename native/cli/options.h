@@ -2,9 +2,11 @@
 #pragma once
 
 #include <charconv>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,7 @@ template <class T>
                                                     const std::string& text);
 [[nodiscard]] bool parse_switch(const std::string& name, const std::string& text);
 [[nodiscard]] GuidingMode parse_guiding(const std::string& text);
+[[nodiscard]] const char* guiding_name(GuidingMode mode);
 
 // "Position,Guide Kappa" or one of the words all, guide, none: the bits of the passes.
 [[nodiscard]] std::uint32_t parse_passes(const std::string& text);
@@ -46,6 +49,10 @@ struct CommonOptions {
     [[nodiscard]] bool take(const std::string& name, const std::string& value);
     void apply(RenderSettings& settings) const;
 };
+
+// Throws std::runtime_error where there is nothing to read, and WriteError.
+[[nodiscard]] std::vector<std::byte> read_bytes(const std::string& path);
+void write_bytes(const std::string& path, std::span<const std::byte> bytes);
 
 // Walks over the arguments: `flag` says whether a word stands alone, `option` takes a name and its
 // value. Returns the one word that is neither, the input file.

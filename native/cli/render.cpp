@@ -3,12 +3,17 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <new>
 #include <optional>
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/picture.h"
+#include "core/atomic_file.h"
+#include "core/checksum.h"
 #include "image/image_io.h"
 #include "scene/dump.h"
+#include "scene/scene_hash.h"
 #include "session/render_session.h"
 
 namespace pharos::cli {
@@ -23,8 +28,11 @@ extern "C" void remember_signal(int signal) {
 
 struct Options : CommonOptions {
     std::optional<float> time_limit;
-    std::vector<std::uint32_t> snapshots;
     std::optional<std::uint32_t> passes;
+    std::string field;       // to load
+    std::string save_field;  // to write
+    bool strict = false;
+    SessionOptions session;
     bool stats = false;
     std::string stats_json;
 };
@@ -36,7 +44,19 @@ void parse_option(const std::string& name, const std::string& value, Options& op
     if (name == "--time-limit") {
         options.time_limit = parse_number<float>(name, value);
     } else if (name == "--snapshots") {
-        options.snapshots = parse_list(name, value);
+        options.session.snapshot_samples = parse_list(name, value);
+    } else if (name == "--sample-offset") {
+        options.session.sample_offset = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--sample-count") {
+        options.samples = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--field") {
+        options.field = value;
+    } else if (name == "--save-field") {
+        options.save_field = value;
+    } else if (name == "--checkpoint") {
+        options.session.checkpoint.path = value;
+    } else if (name == "--checkpoint-interval") {
+        options.session.checkpoint.interval = parse_number<double>(name, value);
     } else if (name == "--passes") {
         options.passes = parse_passes(value);
     } else if (name == "--stats-json") {
@@ -46,20 +66,38 @@ void parse_option(const std::string& name, const std::string& value, Options& op
     }
 }
 
+bool parse_flag(const std::string& word, Options& options) {
+    if (word == "--stats") {
+        options.stats = true;
+    } else if (word == "--strict") {
+        options.strict = true;
+    } else if (word == "--resume") {
+        options.session.checkpoint.resume = Resume::Must;
+    } else {
+        return false;
+    }
+    return true;
+}
+
 Options parse(const std::vector<std::string>& arguments) {
     Options options;
     options.input = walk_arguments(
         arguments,
-        [&](const std::string& word) {
-            options.stats |= word == "--stats";
-            return word == "--stats";
-        },
+        [&](const std::string& word) { return parse_flag(word, options); },
         [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
     if (options.input.empty() || options.output.empty()) {
         throw UsageError("render needs an input file and -o");
     }
+    const CheckpointOptions& checkpoint = options.session.checkpoint;
+    if (checkpoint.resume != Resume::Never && checkpoint.path.empty()) {
+        throw UsageError("--resume needs --checkpoint");
+    }
+    if (!options.field.empty() && !options.save_field.empty()) {
+        throw UsageError("--save-field has nothing to save: --field does not learn");
+    }
+    options.session.threads = options.threads;
     return options;
 }
 
@@ -67,32 +105,6 @@ Options parse(const std::vector<std::string>& arguments) {
 std::string snapshot_path(const std::string& output, std::uint32_t samples) {
     const std::size_t dot = output.ends_with(".exr") ? output.size() - 4 : output.size();
     return output.substr(0, dot) + "." + std::to_string(samples) + output.substr(dot);
-}
-
-void write_picture(const RenderSession& session, const std::string& path) {
-    const std::size_t pixels = std::size_t{session.width()} * session.height();
-    std::vector<std::vector<float>> buffers;
-    std::vector<ExrPass> passes;
-    for (std::size_t i = 0; i < kFilmPasses; ++i) {
-        const auto pass = static_cast<FilmPass>(i);
-        if (pass == FilmPass::SampleCount || !session.has(pass)) {
-            continue;
-        }
-        auto& buffer =
-            buffers.emplace_back(pixels * static_cast<std::size_t>(film_pass_channels(pass)));
-        if (!session.read(pass, buffer)) {
-            throw std::runtime_error("there is no picture to write");
-        }
-        passes.push_back({film_pass_info(pass).name, film_pass_info(pass).channels, buffer});
-    }
-    const ExrOptions options{
-        false,
-        {{"pharos:samples", std::to_string(session.progress().samples)}, {"Software", "Pharos"}}};
-    if (const std::string error =
-            write_exr(path, session.width(), session.height(), passes, options);
-        !error.empty()) {
-        throw std::runtime_error(error);
-    }
 }
 
 void print_statistics(const RenderSession& session) {
@@ -174,7 +186,7 @@ void write_statistics_json(const RenderSession& session, const std::string& path
     }
     out << "\n  ]\n}\n";
     if (!out.flush()) {
-        throw std::runtime_error(path + ": cannot be written");
+        throw WriteError(path + ": cannot be written");
     }
 }
 
@@ -185,18 +197,29 @@ void write_snapshots(const RenderSession& session, const std::string& output) {
         const std::string error =
             write_exr(path, session.width(), session.height(), std::span(&pass, 1), {});
         if (!error.empty()) {
-            throw std::runtime_error(error);
+            throw WriteError(error);
+        }
+    }
+}
+
+void require_assets(const RenderSession& session) {
+    for (const ReportEntry& entry : session.report()) {
+        if (entry.missing) {
+            throw MissingAsset(entry.object + ": " + entry.message);
         }
     }
 }
 
 // Waits for the end; a signal cancels. Returns the exit code of a render that has a picture.
-int wait_for_end(RenderSession& session) {
+int wait_for_end(RenderSession& session, bool strict) {
     std::signal(SIGINT, remember_signal);
     std::signal(SIGTERM, remember_signal);
     while (!session.wait(std::chrono::milliseconds(50))) {
         if (received_signal != 0) {
             session.cancel();
+        }
+        if (strict) {
+            require_assets(session);
         }
     }
     if (received_signal == SIGINT) {
@@ -205,28 +228,75 @@ int wait_for_end(RenderSession& session) {
     return received_signal == SIGTERM ? 143 : 0;
 }
 
-}  // namespace
+// What tells the picture from others of the same scene.
+ShardInfo shard_info(SceneDescription& description, const Options& options) {
+    ShardInfo info;
+    char digits[17];
+    std::snprintf(digits,
+                  sizeof(digits),
+                  "%016llx",
+                  static_cast<unsigned long long>(scene_hash(description)));
+    info.scene = digits;
+    info.guiding = guiding_name(description.settings.guiding);
+    if (!options.session.field.empty()) {
+        std::snprintf(digits,
+                      sizeof(digits),
+                      "%016llx",
+                      static_cast<unsigned long long>(fnv1a(std::span(options.session.field))));
+        info.guiding += std::string(" of ") + digits;
+    }
+    info.window = window_text(description.film);
+    info.seed = description.settings.seed;
+    return info;
+}
 
-int render(const std::vector<std::string>& arguments) {
-    const Options options = parse(arguments);
+SceneDescription load(const Options& options) {
     SceneDescription description = read_dump(options.input);
     options.apply(description.settings);
     description.settings.time_limit = options.time_limit.value_or(description.settings.time_limit);
     description.passes.wanted = options.passes.value_or(description.passes.wanted);
-    RenderSession session(std::move(description), options.threads, options.snapshots);
-    const int code = wait_for_end(session);
-    for (const ReportEntry& entry : session.report()) {
-        std::fprintf(stderr, "pharos-cli: %s: %s\n", entry.object.c_str(), entry.message.c_str());
-    }
+    return description;
+}
+
+void require_success(const RenderSession& session, const Options& options) {
     const SessionProgress progress = session.progress();
+    if (progress.out_of_memory) {
+        throw std::bad_alloc();
+    }
     if (progress.state == SessionState::Failed) {
         throw std::runtime_error(progress.error);
     }
-    write_picture(session, options.output);
+    if (options.strict) {
+        require_assets(session);
+    }
+}
+
+}  // namespace
+
+int render(const std::vector<std::string>& arguments) {
+    Options options = parse(arguments);
+    SceneDescription description = load(options);
+    if (!options.field.empty()) {
+        options.session.field = read_bytes(options.field);
+    }
+    if (!options.save_field.empty() && description.settings.guiding == GuidingMode::Off) {
+        throw UsageError("--save-field has nothing to save: guiding is off");
+    }
+    const ShardInfo info = shard_info(description, options);
+    RenderSession session(std::move(description), options.session);
+    const int code = wait_for_end(session, options.strict);
+    for (const ReportEntry& entry : session.report()) {
+        std::fprintf(stderr, "pharos-cli: %s: %s\n", entry.object.c_str(), entry.message.c_str());
+    }
+    require_success(session, options);
+    write_picture(session, info, options.session.sample_offset, options.output);
     write_snapshots(session, options.output);
+    if (!options.save_field.empty()) {
+        write_bytes(options.save_field, session.field());
+    }
     if (options.stats) {
         print_statistics(session);
-        print_guide(progress.guiding);
+        print_guide(session.progress().guiding);
     }
     if (!options.stats_json.empty()) {
         write_statistics_json(session, options.stats_json);

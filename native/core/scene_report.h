@@ -12,8 +12,9 @@ enum class Severity { Info, Warning, Error };
 
 struct ReportEntry {
     Severity severity = Severity::Warning;
-    std::string object;   // the name of the user's object, image, material ...
-    std::string message;  // one sentence
+    std::string object;    // the name of the user's object, image, material ...
+    std::string message;   // one sentence
+    bool missing = false;  // a file that the scene needs is not there or cannot be used
 };
 
 class SceneReport {
@@ -21,6 +22,8 @@ class SceneReport {
     void add(Severity severity, std::string object, std::string message) {
         entries_.push_back({severity, std::move(object), std::move(message)});
     }
+
+    void add(ReportEntry entry) { entries_.push_back(std::move(entry)); }
 
     void add(const SceneReport& other) {
         entries_.insert(entries_.end(), other.entries_.begin(), other.entries_.end());

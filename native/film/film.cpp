@@ -172,6 +172,21 @@ double Film::noise() const {
     return total > 0.0 ? std::sqrt(difference / total) : 1.0;
 }
 
+void Film::save(StateWriter& out) const {
+    out(sum_, half_sum_, aux_, depth_, blocks_, weight_, half_weight_, count_);
+}
+
+void Film::load(StateReader& in) {
+    for (std::vector<double>* values : {&sum_, &half_sum_, &aux_}) {
+        in.expect(*values);
+    }
+    in.expect(depth_);
+    for (std::vector<double>* values : {&blocks_, &weight_, &half_weight_}) {
+        in.expect(*values);
+    }
+    in.expect(count_);
+}
+
 void Film::clear() {
     std::ranges::fill(sum_, 0.0);
     std::ranges::fill(half_sum_, 0.0);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "core/state_archive.h"
 #include "film/film_description.h"
 #include "film/passes.h"
 
@@ -63,6 +64,14 @@ class Film {
     [[nodiscard]] double noise() const;
 
     void clear();
+
+    // Samples of a pixel so far.
+    [[nodiscard]] std::uint32_t samples(std::uint32_t pixel) const { return count_[pixel]; }
+
+    // All that was added. load() takes the state of a film of the same description and passes;
+    // throws StateError, and is then to be thrown away.
+    void save(StateWriter& out) const;
+    void load(StateReader& in);
 
   private:
     void read_on_request(FilmPass pass, std::span<float> out) const;

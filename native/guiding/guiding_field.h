@@ -34,6 +34,11 @@ struct RadianceRecord {
     std::uint64_t key = 0;      // unique per record (pixel, sample, vertex): the canonical order
 };
 
+template <class Archive>
+void state_fields(Archive& archive, RadianceRecord& r) {
+    archive(r.position, r.normal, r.wi, r.radiance_cos, r.pdf, r.key);
+}
+
 // Structure of arrays over vertices, all of one length.
 struct FieldQuery {
     std::span<const float> px, py, pz;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/checksum.h"
 #include "guiding/network_state.h"
 
 namespace pharos {
@@ -29,15 +30,6 @@ struct FileHeader {
 };
 
 static_assert(sizeof(FileHeader) == 8 + 4 + 4 + 48 + 40 + 16);
-
-// FNV-1a, 64 bits.
-std::uint64_t checksum(std::span<const std::byte> data) {
-    std::uint64_t hash = 0xcbf29ce484222325ull;
-    for (const std::byte b : data) {
-        hash = (hash ^ static_cast<std::uint64_t>(b)) * 0x100000001b3ull;
-    }
-    return hash;
-}
 
 [[noreturn]] void fail(const char* what) {
     throw std::invalid_argument(std::string("guiding field file: ") + what);
@@ -124,7 +116,7 @@ std::vector<std::byte> save_state(const NetworkLayout& layout, const NetworkStat
             append(out, array->data() + offset, count * sizeof(float));
         });
     }
-    const std::uint64_t sum = checksum(out);
+    const std::uint64_t sum = fnv1a(std::span(out));
     append(out, &sum, sizeof(sum));
     return out;
 }
@@ -143,7 +135,7 @@ void load_state(const NetworkLayout& layout, std::span<const std::byte> data, Ne
     const std::span<const std::byte> body = data.first(data.size() - sizeof(std::uint64_t));
     std::uint64_t sum = 0;
     std::memcpy(&sum, data.data() + body.size(), sizeof(sum));
-    if (sum != checksum(body)) {
+    if (sum != fnv1a(body)) {
         fail("checksum is wrong");
     }
     NetworkState loaded = state;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "guiding/selection_moments.h"
+
 namespace pharos {
 
 namespace {
@@ -15,15 +17,9 @@ constexpr std::size_t kCells = std::size_t{kGrid} * kGrid * kGrid * kDirections;
 constexpr std::size_t kParents = std::size_t{kParentGrid} * kParentGrid * kParentGrid * kDirections;
 constexpr std::uint32_t kUntouched = 0xffffffffu;
 
-constexpr int kShares = 4;
-constexpr std::array<float, kShares> kShare = {0.0f, 0.25f, 0.5f, 0.75f};
-
-constexpr double kDecay = 0.9;         // of all sums, a pass
-constexpr double kPriorCount = 128.0;  // weight of the parent in a cell's mean, and so on up
-constexpr double kMaxMoment = 50.0;    // of one record, in units of the picture's variance
+constexpr double kDecay = 0.9;  // of all sums, a pass
 // Counted work, in the proportion that whole renders showed: of a guided vertex beyond that of any
 // (inference, two more densities, its records and their training), and of any vertex.
-constexpr double kMaxContribution = 50.0;  // of one record, in pixels
 constexpr double kGuideCost = 500.0;
 constexpr double kVertexCost = 900.0;
 constexpr double kStay = 0.8;        // hysteresis: a cell that is on stays on with less,
@@ -47,144 +43,16 @@ constexpr double kHopelessShare = 0.02;
 constexpr std::uint32_t kProbeEvery = 64;
 constexpr std::uint32_t kProbePasses = 2;
 
-// Sums of a pass are whole numbers of these units (of the variance and its square), so that the
-// order of records does not matter.
-constexpr double kMomentUnit = 0x1p-32;
-constexpr double kSquareUnit = 0x1p-20;
+// Sums of a pass are whole numbers of these units, so that the order of records does not matter.
 constexpr double kContributionUnit = 0x1p-32;
+constexpr double kCountUnit = 0x1p-20;
 
-// Sums over records: second moments per share, squares of the differences to share 0, count.
-struct Moments {
-    std::array<double, kShares> moment{};
-    std::array<double, kShares> square{};
-    double count = 0.0;
-
-    void add(const Moments& other, double scale) {
-        for (std::size_t a = 0; a < kShares; ++a) {
-            moment[a] += scale * other.moment[a];
-            square[a] += scale * other.square[a];
-        }
-        count += scale * other.count;
-    }
-
-    void decay() {
-        for (std::size_t a = 0; a < kShares; ++a) {
-            moment[a] *= kDecay;
-            square[a] *= kDecay;
-        }
-        count *= kDecay;
-    }
-};
-
-// Contributions to the pixel, in units of what it shows: expected by A, and arrived. Whole numbers
-// of kContributionUnit while a pass adds up.
-struct Contributions {
-    double expected = 0.0;
-    double arrived = 0.0;
-};
-
-// One record counts for 50 pixels at most, so that neither a firefly nor a single wrong A decides.
-Contributions contributions(const SelectionRecord& r) {
-    const auto p = static_cast<double>(r.pdf_used);
-    const double hit = r.hit_radiance > 0.0f ? static_cast<double>(r.hit_radiance) /
-                                                   (static_cast<double>(r.hit_pdf_light) + p)
-                                             : 0.0;
-    const double indirect = r.indirect > 0.0f ? static_cast<double>(r.indirect) / p : 0.0;
-    const double scale = std::sqrt(static_cast<double>(r.weight));
-    const auto limited = [scale](double x) {
-        return std::min(scale * std::max(x, 0.0), kMaxContribution);
-    };
-    return {limited(static_cast<double>(r.expected)), limited(hit + indirect)};
-}
-
-struct PassSums {
-    std::array<std::int64_t, kShares> moment{};
-    std::array<std::int64_t, kShares> square{};
-    std::int64_t count = 0;
-
-    void add(const PassSums& other) {
-        for (std::size_t a = 0; a < kShares; ++a) {
-            moment[a] += other.moment[a];
-            square[a] += other.square[a];
-        }
-        count += other.count;
-    }
-
-    [[nodiscard]] Moments moments(double variance) const {
-        Moments out;
-        for (std::size_t a = 0; a < kShares; ++a) {
-            out.moment[a] = static_cast<double>(moment[a]) * kMomentUnit * variance;
-            out.square[a] = static_cast<double>(square[a]) * kSquareUnit * variance * variance;
-        }
-        out.count = static_cast<double>(count);
-        return out;
-    }
-};
-
-// Second moments of one record's estimate for each share, times its weight (selection.h).
-std::array<double, kShares> record_moments(const SelectionRecord& r) {
-    std::array<double, kShares> out{};
-    for (std::size_t i = 0; i < kShares; ++i) {
-        const auto a = static_cast<double>(kShare[i]);
-        const auto mix = [a](float guide, float bsdf) {
-            return a * static_cast<double>(guide) + (1.0 - a) * static_cast<double>(bsdf);
-        };
-        const double light_pdf =
-            static_cast<double>(r.nee_pdf_light) + mix(r.nee_pdf_guide, r.nee_pdf_bsdf);
-        const double n =
-            r.nee_radiance > 0.0f ? static_cast<double>(r.nee_radiance) / light_pdf : 0.0;
-        const double p = mix(r.pdf_guide, r.pdf_bsdf);
-        const double hit = r.hit_radiance > 0.0f ? static_cast<double>(r.hit_radiance) /
-                                                       (static_cast<double>(r.hit_pdf_light) + p)
-                                                 : 0.0;
-        // (p / p_used) (2 N B + B^2) with B = hit + fL / p, arranged so that p = 0 needs no care
-        // where nothing arrived.
-        const double indirect = r.indirect > 0.0f ? static_cast<double>(r.indirect) / p : 0.0;
-        const double b = hit + indirect;
-        const double along =
-            b > 0.0 ? p / static_cast<double>(r.pdf_used) * (2.0 * n * b + b * b) : 0.0;
-        out[i] = static_cast<double>(r.weight) * (n * n + along);
-    }
-    return out;
-}
-
-bool is_valid(const SelectionRecord& r) {
-    return is_finite(r.position) && is_finite(r.normal) && r.weight > 0.0f && r.pdf_used > 0.0f &&
-           std::isfinite(r.weight) && std::isfinite(r.pdf_used);
-}
-
-// What a decision needs: means after shrinkage, and the standard errors of the gains.
-struct Estimate {
-    std::array<double, kShares> mean{};
-    std::array<double, kShares> gain_error{};
-};
-
-// Means over `own` and kPriorCount records' worth of `above`.
-Moments shrink(const Moments& own, const Moments& above) {
-    Moments out = own;
-    if (above.count > 0.0) {
-        out.add(above, kPriorCount / above.count);
-    }
-    return out;
-}
-
-// `records` is how many records really stand behind the means.
-Estimate estimate(const Moments& shrunk, double records) {
-    Estimate out;
-    const double unit = 1.0 / std::max(shrunk.count, 1e-12);
-    for (std::size_t a = 0; a < kShares; ++a) {
-        out.mean[a] = shrunk.moment[a] * unit;
-    }
-    for (std::size_t a = 0; a < kShares; ++a) {
-        const double gain = out.mean[0] - out.mean[a];
-        const double variance = std::max(shrunk.square[a] * unit - gain * gain, 0.0);
-        out.gain_error[a] = std::sqrt(variance / std::max(records, 1.0));
-    }
-    return out;
-}
+// A sum in a file above this is not one of ours: no render lasts so long.
+constexpr double kMaxLoadedSum = 1e100;
+constexpr double kMaxLoadedCount = 1e12;  // of records: in whole numbers of kSquareUnit it fits
 
 // Index of the share for the next pass, from the one in use.
-std::uint8_t decide(const Estimate& e, std::uint8_t current, double threshold) {
+std::uint8_t decide(const MomentEstimate& e, std::uint8_t current, double threshold) {
     std::uint8_t best = 1;
     for (std::uint8_t a = 2; a < kShares; ++a) {
         best = e.mean[a] < e.mean[best] ? a : best;
@@ -212,9 +80,20 @@ struct GuideSelection::Impl {
         Moments sums;
     };
 
+    // Between passes: what a pass adds up is empty.
+    template <class Archive>
+    friend void state_fields(Archive& archive, Cell& cell) {
+        archive(cell.index, cell.share, cell.sums);
+    }
+
+    template <class Archive>
+    friend void state_fields(Archive& archive, Parent& parent) {
+        archive(parent.share, parent.sums);
+    }
+
     Vec3 lower{0.0f};
     Vec3 scale{0.0f};
-    std::vector<std::uint8_t> share;  // index into kShare, per cell: what alpha() reads
+    ShareTable share{kCells};         // index into kShare, per cell: what alpha() reads
     std::vector<std::uint32_t> slot;  // of the touched cells
     std::vector<Cell> cells;
     std::vector<Parent> parents;
@@ -299,30 +178,13 @@ void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records,
         if (!is_valid(r)) {
             continue;
         }
-        std::array<double, kShares> x = record_moments(r);
-        double largest = 0.0;
-        bool finite = true;
-        for (const double value : x) {
-            finite = finite && std::isfinite(value);
-            largest = std::max(largest, value);
-        }
-        if (!finite) {
+        PassSums& sums = touch(cell_of(r.position, r.normal, r.glossy)).pass;
+        if (!sums.add(record_moments(r), variance)) {
             continue;
         }
         const Contributions c = contributions(r);
         expected[r.glossy] += static_cast<std::int64_t>(c.expected / kContributionUnit + 0.5);
         arrived[r.glossy] += static_cast<std::int64_t>(c.arrived / kContributionUnit + 0.5);
-        // One record counts for 50 variances at most: its four moments shrink together.
-        const double unit =
-            std::min(1.0, kMaxMoment * variance / std::max(largest, 1e-300)) / variance;
-        PassSums& sums = touch(cell_of(r.position, r.normal, r.glossy)).pass;
-        ++sums.count;
-        for (std::size_t a = 0; a < kShares; ++a) {
-            const double value = x[a] * unit;
-            const double gain = x[0] * unit - value;
-            sums.moment[a] += static_cast<std::int64_t>(value / kMomentUnit + 0.5);
-            sums.square[a] += static_cast<std::int64_t>(gain * gain / kSquareUnit + 0.5);
-        }
     }
     for (std::size_t kind = 0; kind < 2; ++kind) {
         Contributions& sum = contributed[kind];
@@ -338,7 +200,7 @@ void GuideSelection::Impl::fold_pass(double variance) {
     std::vector<PassSums> parent_pass(parents.size());
     PassSums global_pass;
     for (Cell& cell : cells) {
-        cell.sums.decay();
+        cell.sums.scale_by(kDecay);
         if (cell.pass.count > 0) {
             cell.sums.add(cell.pass.moments(variance), 1.0);
             parent_pass[cell.parent].add(cell.pass);
@@ -347,10 +209,10 @@ void GuideSelection::Impl::fold_pass(double variance) {
         }
     }
     for (std::size_t i = 0; i < parents.size(); ++i) {
-        parents[i].sums.decay();
+        parents[i].sums.scale_by(kDecay);
         parents[i].sums.add(parent_pass[i].moments(variance), 1.0);
     }
-    global.decay();
+    global.scale_by(kDecay);
     global.add(global_pass.moments(variance), 1.0);
 }
 
@@ -368,7 +230,7 @@ void GuideSelection::Impl::decide_parents(double threshold) {
             parent.share = next;
             for_each_child(static_cast<std::uint32_t>(i), [&](std::uint32_t child) {
                 if (slot[child] == kUntouched) {
-                    share[child] = next;
+                    share.set(child, next);
                 }
             });
         }
@@ -382,7 +244,7 @@ void GuideSelection::Impl::decide_cells(double threshold) {
         const Moments shrunk = shrink(cell.sums, above);
         const double records = cell.sums.count + std::min(parent.sums.count, kPriorCount);
         cell.share = decide(estimate(shrunk, records), cell.share, threshold);
-        share[cell.index] = cell.share;
+        share.set(cell.index, cell.share);
     }
 }
 
@@ -393,7 +255,7 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
     std::int64_t on = 0;
     std::int64_t all = 0;
     for (const Cell& cell : cells) {
-        const auto count = static_cast<std::int64_t>(cell.sums.count / kSquareUnit);
+        const auto count = static_cast<std::int64_t>(cell.sums.count / kCountUnit);
         all += count;
         on += cell.share > 0 ? count : 0;
         statistics.cells_on += cell.share > 0 ? 1 : 0;
@@ -441,7 +303,6 @@ GuideSelection::GuideSelection(const Bounds3& scene_box) : impl_(std::make_uniqu
             impl_->scale[axis] = extent > 1e-30f ? static_cast<float>(kGrid) / extent : 0.0f;
         }
     }
-    impl_->share.assign(kCells, 0);
     impl_->slot.assign(kCells, kUntouched);
     impl_->parents.resize(kParents);
 }
@@ -491,6 +352,52 @@ SelectionStatistics GuideSelection::update(std::span<const SelectionRecord> reco
 
 bool GuideSelection::closed() const {
     return impl_->closed;
+}
+
+void GuideSelection::save(StateWriter& out) const {
+    Impl& s = *impl_;
+    out(s.lower,
+        s.scale,
+        s.share.bytes(),
+        s.cells,
+        s.parents,
+        s.global,
+        s.contributed,
+        s.variance_sum);
+    out(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
+    out(s.closed, s.gate_at);
+}
+
+void GuideSelection::load(StateReader& in) {
+    Impl& s = *impl_;
+    in(s.lower, s.scale);
+    in.expect(s.share.bytes());
+    in(s.cells);
+    in.expect(s.parents);
+    in(s.global, s.contributed, s.variance_sum);
+    in(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
+    in(s.closed, s.gate_at);
+    const auto is_amount = [](double x) { return x >= 0.0 && x < kMaxLoadedSum; };
+    const auto is_sound = [&](const Moments& m) {
+        return std::ranges::all_of(m.moment, is_amount) &&
+               std::ranges::all_of(m.square, is_amount) && m.count >= 0.0 &&
+               m.count < kMaxLoadedCount;
+    };
+    StateReader::require(is_finite(s.lower) && is_finite(s.scale) && is_sound(s.global) &&
+                         is_amount(s.variance_count) && is_amount(s.variance_sum) &&
+                         (s.variance_count == 0.0 || s.variance_sum / s.variance_count > 0.0) &&
+                         s.noise_factor > 0.0 && s.noise_factor <= 1.0);
+    const auto is_share = [](std::uint8_t share) { return share < kShares; };
+    StateReader::require(std::ranges::all_of(s.parents, is_share, &Impl::Parent::share) &&
+                         std::ranges::all_of(s.parents, is_sound, &Impl::Parent::sums));
+    std::ranges::fill(s.slot, kUntouched);
+    for (std::size_t i = 0; i < s.cells.size(); ++i) {
+        Impl::Cell& cell = s.cells[i];
+        StateReader::require(cell.index < kCells && s.slot[cell.index] == kUntouched &&
+                             is_share(cell.share) && is_sound(cell.sums));
+        s.slot[cell.index] = static_cast<std::uint32_t>(i);
+        cell.parent = parent_of(cell.index);
+    }
 }
 
 }  // namespace pharos

@@ -3,10 +3,8 @@
 //
 // Cells are 32^3 positions over the scene's box x 6 dominant normal axes x {diffuse, glossy}, with
 // parents four times coarser and one global cell for shrinkage. For every candidate share a in
-// {0, 1/4, 1/2, 3/4} the second moment of the vertex' estimate is found off-policy from the one
-// recorded sample: with pa = a q + (1 - a) p_b,
-//   N_a = f_e / (p_l + pa(light direction)),  B_a = f_e' / (p_l' + pa) + fL / pa,
-//   S_a += w [ N_a^2 + (pa / p_used) (2 N_a B_a + B_a^2) ],  w = (lum(T) / I_pixel)^2.
+// {0, 1/4, 1/2, 3/4} the second moment S_a of the vertex' estimate is found off-policy from the one
+// recorded sample (selection_moments.h).
 // A cell turns on when S_0 / n - S_a / n exceeds the cost of guiding in units of the picture's
 // variance per unit of work, with hysteresis and a confidence margin, so that one firefly decides
 // nothing. Beside it the field's A is held against what arrived: an adjoint has to add up.
@@ -20,6 +18,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "core/state_archive.h"
 
 namespace pharos {
 
@@ -42,6 +41,13 @@ struct SelectionRecord {
     float expected = 0.0f;  // what the guide's A says of hit and indirect together, before sampling
     std::uint64_t key = 0;
 };
+
+template <class Archive>
+void state_fields(Archive& archive, SelectionRecord& r) {
+    archive(r.position, r.normal, r.glossy, r.weight, r.nee_radiance, r.nee_pdf_light);
+    archive(r.nee_pdf_bsdf, r.nee_pdf_guide, r.hit_radiance, r.hit_pdf_light, r.indirect);
+    archive(r.pdf_used, r.pdf_bsdf, r.pdf_guide, r.expected, r.key);
+}
 
 // What a pass cost and how noisy it was, counted.
 struct SelectionPass {
@@ -77,6 +83,11 @@ class GuideSelection {
     // True: nothing is guided and nothing need be recorded. The gate opens again for probing passes
     // by pass number alone.
     [[nodiscard]] bool closed() const;
+
+    // All that was learned, the scene's box included. load() throws StateError, and the selection
+    // is then to be thrown away.
+    void save(StateWriter& out) const;
+    void load(StateReader& in);
 
   private:
     struct Impl;

@@ -10,6 +10,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include "core/atomic_file.h"
 #include "core/color.h"
 #include "image/image_format.h"
 #include "image/texel_read.h"
@@ -158,8 +159,8 @@ struct Depth {
 
 // The libraries below throw what they like; the user gets a sentence.
 template <class Function>
-[[nodiscard]] DecodedImage guarded(const Function& function) {
-    DecodedImage image;
+[[nodiscard]] auto guarded(const Function& function) {
+    decltype(function()) image;
     try {
         image = function();
     } catch (const Cancelled&) {
@@ -202,6 +203,51 @@ DecodedImage read_image_file(const std::string& path, const CancelFlag* cancel) 
     });
 }
 
+ExrFile read_exr(const std::string& path, bool with_pixels) {
+    return guarded([&] {
+        ExrFile exr;
+        std::error_code code;
+        const std::uint64_t bytes = std::filesystem::file_size(path, code);
+        const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create("openexr");
+        OIIO::ImageSpec spec;
+        if (code || !input || !input->open(path, spec)) {
+            exr.error = "The file " + path + " cannot be read as an EXR";
+            return exr;
+        }
+        exr.error = size_error(spec, bytes);
+        const auto channels = static_cast<std::uint64_t>(spec.nchannels);
+        const std::uint64_t floats = spec.image_pixels() * channels;
+        if (exr.error.empty() &&
+            (channels > kMaxExrChannels || floats * sizeof(float) / kMaxCompression >
+                                               std::max(bytes, kTrustedBytes / kMaxCompression))) {
+            exr.error = "The image claims more than its file can hold";
+        }
+        if (!exr.error.empty()) {
+            return exr;
+        }
+        exr.width = static_cast<std::uint32_t>(spec.width);
+        exr.height = static_cast<std::uint32_t>(spec.height);
+        exr.channels = spec.channelnames;
+        for (const OIIO::ParamValue& attribute : spec.extra_attribs) {
+            if (attribute.type() == OIIO::TypeString) {
+                exr.metadata.emplace_back(attribute.name().string(), attribute.get_string());
+            }
+        }
+        if (!with_pixels) {
+            return exr;
+        }
+        exr.pixels.resize(floats);
+        const std::size_t row = channels * exr.width;
+        float* top = exr.pixels.data() + row * (exr.height - 1);
+        const auto stride = static_cast<OIIO::stride_t>(row * sizeof(float));
+        if (!input->read_image(
+                0, 0, 0, spec.nchannels, OIIO::TypeFloat, top, OIIO::AutoStride, -stride)) {
+            exr.error = reader_error(*input);
+        }
+        return exr;
+    });
+}
+
 DecodedImage read_image_bytes(std::span<const std::uint8_t> bytes, const CancelFlag* cancel) {
     return guarded([&]() -> DecodedImage {
         const auto header = bytes.first(std::min(bytes.size(), detail::kImageHeaderBytes));
@@ -235,9 +281,8 @@ namespace {
         if (!output->open(part, spec) || !output->write_image(type, data) || !output->close()) {
             return fail(output->geterror());
         }
-        std::error_code code;
-        std::filesystem::rename(part, path, code);
-        return code ? fail(code.message()) : std::string();
+        move_into_place(part, path);
+        return {};
     } catch (const std::exception& error) {
         return fail(error.what());
     }

@@ -60,6 +60,20 @@ struct ExrOptions {
                                     std::span<const ExrPass> passes,
                                     const ExrOptions& options = {});
 
+// An EXR as it is: all channels as floats, bottom row first, interleaved.
+struct ExrFile {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    std::vector<std::string> channels;
+    std::vector<float> pixels;
+    std::vector<std::pair<std::string, std::string>> metadata;  // text attributes
+    std::string error;                                          // empty: the rest is valid
+};
+
+// A file of more than kMaxExrChannels channels is refused, and what read_image_file refuses.
+inline constexpr std::uint32_t kMaxExrChannels = 256;
+[[nodiscard]] ExrFile read_exr(const std::string& path, bool with_pixels = true);
+
 // linear: scene-linear values of 1 (grey), 3 or 4 (colours multiplied by alpha) channels, bottom
 // row first; written with the sRGB curve, 8 bits, straight alpha.
 [[nodiscard]] std::string write_png(const std::string& path,

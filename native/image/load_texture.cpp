@@ -77,7 +77,7 @@ Texture load_texture(const ImageDescription& description,
             image.error = "There is not enough memory for the image";
         }
     }
-    report.add(Severity::Warning, description.name, image.error);
+    report.add({Severity::Warning, description.name, image.error, true});
     return Texture();
 }
 

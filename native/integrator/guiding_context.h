@@ -51,6 +51,18 @@ struct RecordBuffer {
         recorded_paths = 0;
         variance_sum = 0;
     }
+
+    void append(const RecordBuffer& other) {
+        radiance.insert(radiance.end(), other.radiance.begin(), other.radiance.end());
+        selection.insert(selection.end(), other.selection.begin(), other.selection.end());
+        recorded_paths += other.recorded_paths;
+        variance_sum += other.variance_sum;
+    }
 };
+
+template <class Archive>
+void state_fields(Archive& archive, RecordBuffer& records) {
+    archive(records.radiance, records.selection, records.recorded_paths, records.variance_sum);
+}
 
 }  // namespace pharos

@@ -163,10 +163,7 @@ RecordBuffer Integrator::take_records() {
     RecordBuffer all;
     for (const auto& worker : workers_) {
         RecordBuffer& own = worker->records;
-        all.radiance.insert(all.radiance.end(), own.radiance.begin(), own.radiance.end());
-        all.selection.insert(all.selection.end(), own.selection.begin(), own.selection.end());
-        all.recorded_paths += own.recorded_paths;
-        all.variance_sum += own.variance_sum;
+        all.append(own);
         own.clear();
     }
     return all;
@@ -189,7 +186,10 @@ bool Integrator::render_pass(const PassSettings& pass,
                 complete.store(false, std::memory_order_relaxed);
                 return;
             }
-            const std::uint32_t sample = pass.first_sample + i;
+            if (film.film.samples(first) > pass.first_sample + i) {
+                continue;  // taken before the render was interrupted
+            }
+            const std::uint32_t sample = pass.offset + pass.first_sample + i;
             render_batch(context, {first, count, sample}, worker);
             timed(worker.statistics, Stage::AccumulateFilm, [&] {
                 const std::shared_lock lock(film.mutex);

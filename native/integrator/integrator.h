@@ -49,7 +49,8 @@ class Integrator {
     Integrator(const Scene& scene, ThreadPool& pool);
     ~Integrator();
 
-    // Renders a pass; false when it was stopped before its end (finished batches are in the film).
+    // Renders a pass, of each batch what the film does not have yet; false when it was stopped
+    // before its end (finished batches are in the film).
     bool render_pass(const PassSettings& pass,
                      const GuidingContext& guiding,
                      SharedFilm& film,

@@ -13,12 +13,13 @@
 
 namespace pharos {
 
-// One pass: `samples` consecutive samples of every pixel.
+// One pass: `samples` consecutive samples of every pixel, counted from 0 on an empty film.
 struct PassSettings {
     std::uint32_t first_sample = 0;
     std::uint32_t samples = 1;
     // On the film, by the colour of the pixel on a checkerboard: (x + y) % 2 in the window.
     std::array<double, 2> weight{1.0, 1.0};
+    std::uint32_t offset = 0;  // of the film's first sample in the pixel's sequence
 };
 
 struct RenderContext {

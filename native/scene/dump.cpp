@@ -1,16 +1,14 @@
 #include "scene/dump.h"
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
 
-#include <unistd.h>
-
+#include "core/atomic_file.h"
+#include "core/checksum.h"
 #include "scene/dump_fields.h"
 
 namespace pharos {
@@ -29,16 +27,6 @@ struct Header {
 };
 
 static_assert(sizeof(Header) == 32);
-
-// FNV-1a, 64 bit (Fowler, Noll, Vo): each step is a bijection, so that any single changed byte
-// shows.
-std::uint64_t fnv1a(std::span<const std::uint8_t> bytes) {
-    std::uint64_t hash = 0xcbf29ce484222325u;
-    for (const std::uint8_t byte : bytes) {
-        hash = (hash ^ byte) * 0x100000001b3u;
-    }
-    return hash;
-}
 
 std::vector<std::uint8_t> read_bytes(std::ifstream& file, std::size_t size) {
     std::vector<std::uint8_t> bytes(size);
@@ -78,11 +66,6 @@ SceneDescription parse(const Header& header, std::span<const std::uint8_t> paylo
         throw std::runtime_error("damaged: too long");
     }
     return description;
-}
-
-// A name nobody else writes to, in the same directory, so that renaming it is atomic.
-std::string temporary_name(const std::string& path) {
-    return path + ".part" + std::to_string(::getpid());
 }
 
 [[noreturn]] void fail(const std::string& path, const std::string& message) {
@@ -133,23 +116,9 @@ SceneDescription dump_from_bytes(std::span<const std::uint8_t> bytes) {
 
 void write_dump(const SceneDescription& description, const std::string& path) {
     const std::vector<std::uint8_t> bytes = dump_to_bytes(description);
-    const std::string part = temporary_name(path);
-    std::ofstream file(part, std::ios::binary | std::ios::trunc);
-    if (!file) {
-        fail(path, "cannot be written: " + std::generic_category().message(errno));
-    }
-    file.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    std::error_code error;
-    if (file) {
-        std::filesystem::rename(part, path, error);
-    }
-    if (!file || error) {
-        const std::string reason = file ? error.message() : "the disk may be full";
-        std::filesystem::remove(part, error);
-        fail(path, "cannot be written: " + reason);
-    }
+    AtomicFile file(path);
+    file.write(std::as_bytes(std::span(bytes)));
+    file.commit();
 }
 
 SceneDescription read_dump(const std::string& path) {

@@ -1,7 +1,8 @@
 // Scene descriptions in a file: versioned, checksummed, little-endian; images are embedded, so that
-// a dump renders the same anywhere. Written to a temporary name and renamed.
+// a dump renders the same anywhere. Written as AtomicFile does.
 //
-// Errors: std::runtime_error with the path and what is wrong (truncated, foreign, damaged, newer).
+// Errors: std::runtime_error with the path and what is wrong (truncated, foreign, damaged, newer);
+// WriteError where it cannot be written.
 #pragma once
 
 #include <cstdint>

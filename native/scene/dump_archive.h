@@ -16,6 +16,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/checksum.h"
 #include "core/math.h"
 #include "image/image_description.h"
 
@@ -41,6 +42,9 @@ class Writer {
     // Another version than the newest: for tests of reading old files.
     explicit Writer(std::uint32_t version = kVersion) : version_(version) {}
 
+    // Keeps no bytes, only their checksum.
+    explicit Writer(StreamChecksum& checksum) : version_(kVersion), checksum_(&checksum) {}
+
     [[nodiscard]] std::uint32_t version() const { return version_; }
 
     template <class... T>
@@ -58,6 +62,10 @@ class Writer {
   private:
     void put_bytes(const void* data, std::size_t size) {
         const auto* first = static_cast<const std::uint8_t*>(data);
+        if (checksum_ != nullptr) {
+            checksum_->add(std::as_bytes(std::span(first, size)));
+            return;
+        }
         bytes_.insert(bytes_.end(), first, first + size);
     }
 
@@ -93,6 +101,7 @@ class Writer {
 
     std::vector<std::uint8_t> bytes_;
     std::uint32_t version_;
+    StreamChecksum* checksum_ = nullptr;
 };
 
 class Reader {

@@ -1,7 +1,9 @@
 #include "session/guide_controller.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "session/pixel_estimate.h"
 
@@ -103,17 +105,17 @@ std::uint32_t GuideController::most_samples(std::uint32_t done) const {
 
 void GuideController::see(const Film& film, std::uint32_t done) {
     // SLIDES guides from pass 1 on: what it shows there is no longer independent of pass 0.
-    if (selection_) {
+    if (selection_ && !frozen_) {
         weights_.see(film, done);
     }
 }
 
 GuidingContext GuideController::next_pass() const {
     GuidingContext context;
-    if (!learning()) {
+    if (!enabled_ || status_.closed) {
         return context;
     }
-    context.record = true;
+    context.record = !frozen_;
     context.record_probability = record_probability_;
     context.pixel_estimate = pixel_estimate_;
     if (field_->generation() == 0) {
@@ -127,7 +129,7 @@ GuidingContext GuideController::next_pass() const {
     context.selection = &*selection_;
     context.selection_serves = status_.guided_share > 0.0;
     context.fixed_share = hard_share_;
-    context.probe = true;
+    context.probe = !frozen_;
     const auto patience = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(kPathsBeforeRoulette / std::max<std::uint64_t>(1, pixels_),
                                   kMinPassesBeforeRoulette,
@@ -187,9 +189,62 @@ void GuideController::learn(RecordBuffer records,
 }
 
 void GuideController::rest() {
-    if (enabled_ && selection_) {
+    if (enabled_ && selection_ && !frozen_) {
         status_.closed = selection_->update({}, {}).closed;
     }
+}
+
+void GuideController::save(StateWriter& out) const {
+    out(pass_, hard_, hard_share_, adjoint_scale_, record_probability_, pixel_estimate_, weights_);
+    out(status_);
+    if (enabled_) {
+        out(field_->save());
+    }
+    if (selection_) {
+        selection_->save(out);
+    }
+}
+
+void GuideController::read_state(StateReader& in) {
+    const bool enabled = enabled_;
+    in(pass_, hard_, hard_share_, adjoint_scale_, record_probability_, pixel_estimate_, weights_);
+    in(status_);
+    StateReader::require(status_.enabled == enabled && record_probability_ > 0.0f &&
+                         record_probability_ <= 1.0f && hard_share_ >= 0.0f &&
+                         hard_share_ <= kMaxHardShare);
+    for (const float scale : adjoint_scale_) {
+        StateReader::require(scale >= 0.0f && scale <= static_cast<float>(kMaxCalibration));
+    }
+    for (const float pixel : pixel_estimate_) {
+        StateReader::require(pixel > 0.0f && std::isfinite(pixel));
+    }
+    if (enabled_) {
+        std::vector<std::byte> field;
+        in(field);
+        try {
+            field_->load(field);
+        } catch (const std::invalid_argument& error) {
+            throw StateError(error.what());
+        }
+    }
+    if (selection_) {
+        selection_->load(in);
+    }
+}
+
+void GuideController::load(StateReader& in) {
+    read_state(in);
+    StateReader::require((pixel_estimate_.empty() || pixel_estimate_.size() == pixels_) &&
+                         weights_.fits(pixels_));
+}
+
+void GuideController::load_frozen(StateReader& in) {
+    read_state(in);
+    weights_ = {};
+    if (pixel_estimate_.size() != pixels_) {
+        pixel_estimate_.clear();
+    }
+    frozen_ = true;
 }
 
 // A is only an adjoint where what it expects arrives.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/state_archive.h"
 #include "film/film.h"
 #include "integrator/guiding_context.h"
 #include "integrator/render_context.h"
@@ -31,7 +32,7 @@ class GuideController {
     // proven has to be proven anew.
     void begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited);
 
-    [[nodiscard]] bool learning() const { return enabled_ && !status_.closed; }
+    [[nodiscard]] bool learning() const { return enabled_ && !frozen_ && !status_.closed; }
 
     // Samples that the next pass should take at most, after `done` of them: few while much is
     // learned from each.
@@ -44,6 +45,11 @@ class GuideController {
     // not independent of what guided them.
     [[nodiscard]] std::array<double, 2> weight(std::uint32_t first_sample) const;
 
+    // What it has learned, used or not; null: nothing yet.
+    [[nodiscard]] const GuidingField* learned() const {
+        return field_ && field_->generation() > 0 ? &*field_ : nullptr;
+    }
+
     // What the next pass may use. Valid until learn() is called.
     [[nodiscard]] GuidingContext next_pass() const;
 
@@ -55,11 +61,25 @@ class GuideController {
 
     [[nodiscard]] const GuideStatus& status() const { return status_; }
 
+    // All that was learned and decided, between passes. load() takes the state of a controller of
+    // the same mode and picture size; throws StateError, and the controller is then to be thrown
+    // away.
+    void save(StateWriter& out) const;
+    void load(StateReader& in);
+
+    // Takes the state of any controller of the same mode, as a field file (field_file.h) holds it,
+    // and learns no more: all passes are guided alike and count alike, so that the samples of a
+    // picture may be taken apart. What was learned about another picture's pixels is left out.
+    void load_frozen(StateReader& in);
+
   private:
     void calibrate(const std::array<double, 2>& calibration);
     void judge_hardness(const SelectionStatistics& selected);
 
+    void read_state(StateReader& in);
+
     bool enabled_;
+    bool frozen_ = false;
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
     bool continued_ = false;  // from an earlier picture

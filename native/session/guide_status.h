@@ -18,6 +18,12 @@ struct GuideStatus {
     std::uint64_t skipped_steps = 0;
 };
 
+template <class Archive>
+void state_fields(Archive& archive, GuideStatus& s) {
+    archive(s.enabled, s.closed, s.guided_share, s.moment_ratio, s.loss, s.held_out_loss);
+    archive(s.snapshots, s.records, s.skipped_steps);
+}
+
 enum class GuideState : std::uint8_t {
     Off,       // not asked for
     Learning,  // no snapshot is published yet

@@ -49,10 +49,10 @@ LobeProbe probe_lobes(const Scene& scene, const GuideController& guide, const Ve
     probe.hit = true;
     probe.position = surface.p;
     probe.normal = surface.ns;
-    const GuidingContext context = guide.next_pass();
-    if (context.field == nullptr) {
+    if (guide.learned() == nullptr) {
         return probe;
     }
+    const GuidingContext context = guide.next_pass();
     const auto share = [&](bool glossy) {
         const float proven = context.selection != nullptr
                                  ? context.selection->alpha(surface.p, surface.ns, glossy)
@@ -61,7 +61,7 @@ LobeProbe probe_lobes(const Scene& scene, const GuideController& guide, const Ve
     };
     probe.diffuse_share = share(false);
     probe.glossy_share = share(true);
-    const VmfMixture mixture = ask(*context.field, surface);
+    const VmfMixture mixture = ask(*guide.learned(), surface);
     probe.irradiance = mixture.A;
     for (int k = 0; k < mixture.lobe_count; ++k) {
         const VmfLobe lobe = mixture.lobe(k);

@@ -94,6 +94,12 @@ void PassWeights::see(const Film& film, std::uint32_t done) {
     }
 }
 
+bool PassWeights::fits(std::uint64_t pixels) const {
+    return passes_.second.empty() &&
+           (passes_.first.empty() || (passes_.first.size() == pixels &&
+                                      std::uint64_t{passes_.width} * passes_.height == pixels));
+}
+
 std::array<double, 2> PassWeights::of(std::uint32_t first) const {
     std::array<double, 2> weight{1.0, 1.0};
     for (std::size_t color = 0; color < 2; ++color) {

@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/state_archive.h"
 #include "film/film.h"
 
 namespace pharos {
@@ -42,6 +43,15 @@ class PassWeights {
 
     // Light is hard to find, by the pixels of both colours; known after two samples.
     [[nodiscard]] bool hard() const { return hard_[0] && hard_[1]; }
+
+    template <class Archive>
+    friend void state_fields(Archive& archive, PassWeights& weights) {
+        FirstPasses& passes = weights.passes_;
+        archive(passes.width, passes.height, passes.first, passes.second, weights.hard_);
+    }
+
+    // What was loaded fits a picture of this size.
+    [[nodiscard]] bool fits(std::uint64_t pixels) const;
 
   private:
     FirstPasses passes_;

@@ -3,16 +3,21 @@
 #include <algorithm>
 #include <condition_variable>
 #include <ctime>
+#include <limits>
 #include <mutex>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "core/cancel.h"
+#include "core/checksum.h"
 #include "core/fp_state.h"
 #include "integrator/integrator.h"
 #include "scene/scene.h"
+#include "scene/scene_hash.h"
+#include "session/field_file.h"
 #include "session/guide_controller.h"
 #include "session/pass_schedule.h"
 
@@ -34,7 +39,8 @@ using Clock = std::chrono::steady_clock;
 }
 
 // Problems that leave nothing to render; empty when there are none.
-[[nodiscard]] std::string fatal_problem(const SceneDescription& description) {
+[[nodiscard]] std::string fatal_problem(const SceneDescription& description,
+                                        const SessionOptions& options) {
     const FilmDescription& film = description.film;
     if (!description.has_camera) {
         return "The scene has no camera: add one and make it the active camera.";
@@ -49,20 +55,60 @@ using Clock = std::chrono::steady_clock;
     if (description.settings.samples == 0) {
         return "The number of samples is zero.";
     }
+    if (description.settings.samples >
+        std::numeric_limits<std::uint32_t>::max() - options.sample_offset) {
+        return "The samples reach beyond what can be counted.";
+    }
+    if (!options.field.empty() && description.settings.guiding == GuidingMode::Off) {
+        return "There is a guide to load, but guiding is off.";
+    }
     return {};
 }
 
+// Only a checkpoint needs it: it takes as long as writing the scene to memory.
+[[nodiscard]] RenderIdentity identify(SceneDescription& description,
+                                      const SessionOptions& options) {
+    RenderIdentity identity;
+    if (options.checkpoint.path.empty()) {
+        return identity;
+    }
+    identity.scene = scene_hash(description);
+    identity.field = options.field.empty() ? 0 : fnv1a(std::span(options.field));
+    identity.seed = description.settings.seed;
+    identity.offset = options.sample_offset;
+    identity.guiding = description.settings.guiding;
+    identity.width = description.film.crop_width;
+    identity.height = description.film.crop_height;
+    return identity;
+}
+
+[[nodiscard]] SessionOptions with_threads(unsigned threads) {
+    SessionOptions options;
+    options.threads = threads;
+    return options;
+}
+
+constexpr const char* kOutOfMemory = "Out of memory: the scene does not fit.";
+
 }  // namespace
 
-// Where a render stands at the end of a pass.
-struct PassEnd {
-    std::uint32_t samples = 0;
-    double cpu_seconds = 0.0;
+// What the passes of a render work on.
+struct RenderSession::Work {
+    ThreadPool& pool;
+    Integrator& integrator;
+    SharedFilm& film;
+    GuideController& guide;
+    RenderPosition position;
+    std::uint64_t nonfinite_before = 0;  // in the checkpoint it went on from
+    double cpu_begin = process_cpu_seconds();
+    std::function<void(const GuideController&)> after_pass;
 };
 
 struct RenderSession::Impl {
+    using Work = RenderSession::Work;
+
     CancelFlag cancel;
-    unsigned threads = 0;
+    SessionOptions options;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
     PassLayout passes;
@@ -72,25 +118,27 @@ struct RenderSession::Impl {
     SessionProgress progress;
     SessionStatistics statistics;
     SceneReport report;
-    std::vector<std::uint32_t> snapshot_samples;  // ascending
     std::vector<SessionSnapshot> snapshots;
     std::shared_ptr<SharedFilm> film;
     std::uint64_t batches_per_sample = 1;
     std::optional<Clock::time_point> render_begin;
+    std::vector<std::byte> field;
 
     // Last: joins before anything it uses is destroyed.
     std::jthread driver;
 
     void run(SceneDescription description);
     void run_built(const BuiltScene& built);
-    void render(const Scene& scene, const BuiltScene* built);
-    void learn(GuideController& guide,
-               Integrator& integrator,
-               const BatchStatistics& before,
-               ThreadPool& pool);
-    void finish_pass(const Integrator& integrator,
-                     const GuideController& guide,
-                     const PassEnd& end);
+    void render(const Scene& scene, const RenderIdentity& identity, const BuiltScene* built);
+    [[nodiscard]] GuideController make_guide(const Scene& scene) const;
+    void resume(const Scene& scene, const CheckpointKeeper& keeper, Work& work);
+    void begin(const Scene& scene, const Work& work);
+    void render_passes(const RenderSettings& settings, CheckpointKeeper& keeper, Work& work);
+    [[nodiscard]] bool render_pass(const PassSettings& pass, const StopCondition& stop, Work& work);
+    void learn(Work& work);
+    void keep(CheckpointKeeper& keeper, const Work& work);
+    void finish_pass(const Work& work);
+    void note(Severity severity, const std::string& object, const std::string& message);
     void end(SessionState state, const std::string& error);
 
     [[nodiscard]] bool is_ended() const { return progress.state >= SessionState::Finished; }
@@ -100,6 +148,7 @@ void RenderSession::Impl::end(SessionState state, const std::string& error) {
     const std::lock_guard lock(mutex);
     progress.state = state;
     progress.error = error;
+    progress.out_of_memory = error == kOutOfMemory;
     if (render_begin) {
         progress.elapsed = seconds_since(*render_begin);
     }
@@ -107,27 +156,35 @@ void RenderSession::Impl::end(SessionState state, const std::string& error) {
     ended.notify_all();
 }
 
+void RenderSession::Impl::note(Severity severity,
+                               const std::string& object,
+                               const std::string& message) {
+    const std::lock_guard lock(mutex);
+    report.add(severity, object, message);
+}
+
 void RenderSession::Impl::run(SceneDescription description) {
     const FloatStateGuard float_state;
     try {
-        if (const std::string problem = fatal_problem(description); !problem.empty()) {
+        if (const std::string problem = fatal_problem(description, options); !problem.empty()) {
             end(SessionState::Failed, problem);
             return;
         }
         SceneReport build_report;
         const Clock::time_point begin = Clock::now();
+        const RenderIdentity identity = identify(description, options);
         const auto scene = build_scene(std::move(description), cancel, build_report);
         {
             const std::lock_guard lock(mutex);
             report = build_report;
             statistics.build_seconds = seconds_since(begin);
         }
-        render(*scene, nullptr);
+        render(*scene, identity, nullptr);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const Cancelled&) {
         end(SessionState::Cancelled, {});
     } catch (const std::bad_alloc&) {
-        end(SessionState::Failed, "Out of memory: the scene does not fit.");
+        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
         end(SessionState::Failed, error.what());
     }
@@ -136,103 +193,179 @@ void RenderSession::Impl::run(SceneDescription description) {
 void RenderSession::Impl::run_built(const BuiltScene& built) {
     const FloatStateGuard float_state;
     try {
-        if (const std::string problem = fatal_problem(built.scene.description); !problem.empty()) {
+        const SceneDescription& description = built.scene.description;
+        if (const std::string problem = fatal_problem(description, options); !problem.empty()) {
             end(SessionState::Failed, problem);
             return;
         }
-        render(built.scene, &built);
+        render(built.scene, RenderIdentity{}, &built);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
+    } catch (const std::bad_alloc&) {
+        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
         end(SessionState::Failed, error.what());
     }
 }
 
-void RenderSession::Impl::render(const Scene& scene, const BuiltScene* built) {
+GuideController RenderSession::Impl::make_guide(const Scene& scene) const {
+    const GuidingMode mode = scene.description.settings.guiding;
+    GuideController guide(mode, scene.bounds, std::uint64_t{width} * height);
+    if (!options.field.empty()) {
+        freeze_field(options.field, mode, guide);
+    }
+    return guide;
+}
+
+// Goes on from the checkpoint, if there is one to go on from.
+void RenderSession::Impl::resume(const Scene& scene, const CheckpointKeeper& keeper, Work& work) {
+    if (!keeper.finds()) {
+        return;
+    }
+    try {
+        work.position = keeper.read(work.film.film, work.guide);
+    } catch (const StateError& error) {
+        if (options.checkpoint.resume == Resume::Must) {
+            throw;
+        }
+        note(Severity::Info, "Checkpoint", std::string("Rendered anew: ") + error.what());
+        work.film.film = Film(scene.description.film, PassLayout(scene.description.passes.wanted));
+        work.guide = make_guide(scene);
+        work.position = {};
+    }
+    work.nonfinite_before = work.position.nonfinite;
+    work.film.serial = std::uint64_t{work.position.done} * work.integrator.batches_per_sample();
+}
+
+void RenderSession::Impl::begin(const Scene& scene, const Work& work) {
+    const std::uint64_t pixels = std::uint64_t{width} * height;
+    const std::lock_guard lock(mutex);
+    render_begin = Clock::now();
+    batches_per_sample = work.integrator.batches_per_sample();
+    progress.state = SessionState::Rendering;
+    progress.samples = work.position.done;
+    progress.total_samples = scene.description.settings.samples;
+    progress.memory_bytes = scene.bytes() + pixels * (200 + sizeof(double) * passes.size());
+}
+
+void RenderSession::Impl::render(const Scene& scene,
+                                 const RenderIdentity& identity,
+                                 const BuiltScene* built) {
     const RenderSettings& settings = scene.description.settings;
-    ThreadPool pool(threads);
+    ThreadPool pool(options.threads);
     Integrator integrator(scene, pool);
     const auto shared_film = std::make_shared<SharedFilm>(
         scene.description.film, PassLayout(scene.description.passes.wanted));
-    const std::uint64_t pixels = std::uint64_t{width} * height;
-    const Clock::time_point begin = Clock::now();
+    std::optional<GuideController> own_guide;
+    GuideController& guide = built != nullptr ? built->guide : own_guide.emplace(make_guide(scene));
+    Work work{pool, integrator, *shared_film, guide, {}};
+    work.after_pass = built != nullptr ? built->after_pass : nullptr;
+    CheckpointKeeper keeper(options.checkpoint, identity);
+    resume(scene, keeper, work);
     {
         const std::lock_guard lock(mutex);
         film = shared_film;
-        render_begin = begin;
-        batches_per_sample = integrator.batches_per_sample();
-        progress.state = SessionState::Rendering;
-        progress.total_samples = settings.samples;
-        progress.memory_bytes = scene.bytes() + pixels * (200 + sizeof(double) * passes.size());
     }
-    const double cpu_begin = process_cpu_seconds();
+    begin(scene, work);
+    render_passes(settings, keeper, work);
+    keep(keeper, work);
+    if (settings.guiding != GuidingMode::Off && built == nullptr) {
+        std::vector<std::byte> bytes = field_to_bytes(work.guide, settings.guiding);
+        const std::lock_guard lock(mutex);
+        field = std::move(bytes);
+    }
+    if (shared_film->film.passes().wants_any(kGuidePasses) && !cancel.cancelled()) {
+        integrator.render_guide_passes(work.guide.next_pass(), *shared_film);
+        finish_pass(work);
+    }
+}
+
+void RenderSession::Impl::render_passes(const RenderSettings& settings,
+                                        CheckpointKeeper& keeper,
+                                        Work& work) {
+    const Clock::time_point begin = Clock::now();
+    const std::uint64_t pixels = std::uint64_t{width} * height;
     StopCondition stop{cancel, std::nullopt};
-    std::optional<GuideController> own_guide;
-    GuideController& guide =
-        built != nullptr ? built->guide : own_guide.emplace(settings.guiding, scene.bounds, pixels);
-    std::uint32_t done = 0;
+    std::uint32_t& done = work.position.done;
+    if (done > 0) {
+        finish_pass(work);
+    }
     while (done < settings.samples) {
-        PassSettings pass = next_pass(done, settings.samples, pixels);
-        pass.samples = std::min(pass.samples, guide.most_samples(done));
-        pass.weight = guide.weight(done);
-        const BatchStatistics before = integrator.statistics();
-        if (!integrator.render_pass(pass, guide.next_pass(), *shared_film, stop)) {
-            finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
-            return;
-        }
-        done += pass.samples;
-        guide.see(shared_film->film, done);
-        learn(guide, integrator, before, pool);
-        finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
-        if (built != nullptr && built->after_pass) {
-            built->after_pass(guide);
-        }
-        if (settings.time_limit > 0.0f) {
+        if (settings.time_limit > 0.0f && done > 0) {
             // Only after the first pass: every pixel has a sample by then.
             stop.deadline = begin + std::chrono::duration_cast<Clock::duration>(
                                         std::chrono::duration<float>(settings.time_limit));
         }
-        if (stop.reached()) {
-            break;
+        PassSettings pass = next_pass(done, settings.samples, pixels);
+        pass.samples = std::min(pass.samples, work.guide.most_samples(done));
+        pass.weight = work.guide.weight(done);
+        pass.offset = options.sample_offset;
+        if ((done > 0 && stop.reached()) || !render_pass(pass, stop, work)) {
+            finish_pass(work);
+            return;
+        }
+        done += pass.samples;
+        work.guide.see(work.film.film, done);
+        learn(work);
+        finish_pass(work);
+        if (work.after_pass) {
+            work.after_pass(work.guide);
+        }
+        if (keeper.due()) {
+            keep(keeper, work);
         }
     }
-    if (shared_film->film.passes().wants_any(kGuidePasses) && !cancel.cancelled()) {
-        integrator.render_guide_passes(guide.next_pass(), *shared_film);
-        finish_pass(integrator, guide, {done, process_cpu_seconds() - cpu_begin});
-    }
 }
 
-void RenderSession::Impl::learn(GuideController& guide,
-                                Integrator& integrator,
-                                const BatchStatistics& before,
-                                ThreadPool& pool) {
-    if (!guide.learning()) {
-        guide.rest();
+// Its records are in `work` afterwards, whether it came to its end or not.
+bool RenderSession::Impl::render_pass(const PassSettings& pass,
+                                      const StopCondition& stop,
+                                      Work& work) {
+    const BatchStatistics before = work.integrator.statistics();
+    const bool complete =
+        work.integrator.render_pass(pass, work.guide.next_pass(), work.film, stop);
+    const BatchStatistics& after = work.integrator.statistics();
+    RenderPosition& position = work.position;
+    position.records.append(work.integrator.take_records());
+    position.paths += after.camera_samples - before.camera_samples;
+    position.vertices += after.vertices - before.vertices;
+    position.nonfinite = work.nonfinite_before + after.nonfinite;
+    return complete;
+}
+
+void RenderSession::Impl::learn(Work& work) {
+    RenderPosition& position = work.position;
+    RecordBuffer records = std::exchange(position.records, {});
+    SelectionPass counted;
+    counted.paths = static_cast<double>(std::exchange(position.paths, 0));
+    counted.vertices = static_cast<double>(std::exchange(position.vertices, 0));
+    if (!work.guide.learning()) {
+        work.guide.rest();
         return;
     }
-    const BatchStatistics& after = integrator.statistics();
-    SelectionPass work;
-    work.paths = static_cast<double>(after.camera_samples - before.camera_samples);
-    work.vertices = static_cast<double>(after.vertices - before.vertices);
-    RecordBuffer records = integrator.take_records();
     const std::uint64_t items = records.radiance.size();
     const Clock::time_point begin = Clock::now();
-    guide.learn(std::move(records), work, film->film, pool);
-    integrator.book_training(items, static_cast<std::uint64_t>(1e9 * seconds_since(begin)));
+    work.guide.learn(std::move(records), counted, work.film.film, work.pool);
+    work.integrator.book_training(items, static_cast<std::uint64_t>(1e9 * seconds_since(begin)));
 }
 
-void RenderSession::Impl::finish_pass(const Integrator& integrator,
-                                      const GuideController& guide,
-                                      const PassEnd& pass_end) {
-    const BatchStatistics& batch = integrator.statistics();
+void RenderSession::Impl::keep(CheckpointKeeper& keeper, const Work& work) {
+    const std::string error = keeper.write(work.position, work.film.film, work.guide);
+    if (!error.empty()) {
+        note(Severity::Warning, "Checkpoint", error);
+    }
+}
+
+void RenderSession::Impl::finish_pass(const Work& work) {
+    const BatchStatistics& batch = work.integrator.statistics();
     const double noise = [&] {
         const std::shared_lock film_lock(film->mutex);
         return film->film.noise();
     }();
     const std::lock_guard lock(mutex);
-    progress.samples = pass_end.samples;
-    progress.guiding = guide.status();
+    progress.samples = work.position.done;
+    progress.guiding = work.guide.status();
     progress.noise = noise;
-    progress.nonfinite_samples = batch.nonfinite;
+    progress.nonfinite_samples = work.nonfinite_before + batch.nonfinite;
     statistics.stages.clear();
     for (std::size_t i = 0; i < batch.stages.size(); ++i) {
         statistics.stages.push_back({std::string(kStageNames[i]),
@@ -242,26 +375,26 @@ void RenderSession::Impl::finish_pass(const Integrator& integrator,
     statistics.camera_samples = batch.camera_samples;
     statistics.vertices = batch.vertices;
     statistics.rays = batch.rays;
-    statistics.render_cpu_seconds = pass_end.cpu_seconds;
-    while (snapshots.size() < snapshot_samples.size() &&
-           snapshot_samples[snapshots.size()] <= pass_end.samples) {
-        SessionSnapshot snapshot{pass_end.samples, pass_end.cpu_seconds, {}};
+    statistics.render_cpu_seconds = process_cpu_seconds() - work.cpu_begin;
+    const std::vector<std::uint32_t>& wanted = options.snapshot_samples;
+    while (snapshots.size() < wanted.size() && wanted[snapshots.size()] <= work.position.done) {
+        SessionSnapshot snapshot{work.position.done, statistics.render_cpu_seconds, {}};
         snapshot.combined.resize(std::size_t{width} * height * 4);
         film->film.read(FilmPass::Combined, snapshot.combined);
         snapshots.push_back(std::move(snapshot));
     }
 }
 
-RenderSession::RenderSession(SceneDescription description,
-                             unsigned threads,
-                             std::vector<std::uint32_t> snapshot_samples)
+RenderSession::RenderSession(SceneDescription description, unsigned threads)
+    : RenderSession(std::move(description), with_threads(threads)) {}
+
+RenderSession::RenderSession(SceneDescription description, SessionOptions options)
     : impl_(std::make_unique<Impl>()) {
-    impl_->threads = threads;
     impl_->width = description.film.crop_width;
     impl_->height = description.film.crop_height;
     impl_->passes = PassLayout(description.passes.wanted);
-    std::ranges::sort(snapshot_samples);
-    impl_->snapshot_samples = std::move(snapshot_samples);
+    std::ranges::sort(options.snapshot_samples);
+    impl_->options = std::move(options);
     impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
         impl->run(std::move(scene));
     });
@@ -270,7 +403,7 @@ RenderSession::RenderSession(SceneDescription description,
 RenderSession::RenderSession(const BuiltScene& built, unsigned threads)
     : impl_(std::make_unique<Impl>()) {
     const SceneDescription& description = built.scene.description;
-    impl_->threads = threads;
+    impl_->options = with_threads(threads);
     impl_->width = description.film.crop_width;
     impl_->height = description.film.crop_height;
     impl_->passes = PassLayout(description.passes.wanted);
@@ -325,6 +458,11 @@ std::vector<ReportEntry> RenderSession::report() const {
 std::vector<SessionSnapshot> RenderSession::snapshots() const {
     const std::lock_guard lock(impl_->mutex);
     return impl_->snapshots;
+}
+
+std::vector<std::byte> RenderSession::field() const {
+    const std::lock_guard lock(impl_->mutex);
+    return impl_->field;
 }
 
 std::uint32_t RenderSession::width() const {

@@ -16,6 +16,7 @@
 #include "core/scene_report.h"
 #include "film/film.h"
 #include "scene/scene_description.h"
+#include "session/checkpoint_keeper.h"
 #include "session/guide_status.h"
 
 namespace pharos {
@@ -27,8 +28,9 @@ enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelle
 
 struct SessionProgress {
     SessionState state = SessionState::Building;
-    std::string error;          // state Failed: one sentence
-    std::uint32_t samples = 0;  // finished passes of the whole frame
+    std::string error;           // state Failed: one sentence
+    bool out_of_memory = false;  // state Failed: this is why
+    std::uint32_t samples = 0;   // finished passes of the whole frame
     std::uint32_t total_samples = 0;
     std::uint64_t serial = 0;        // grows whenever the picture has changed
     double fraction = 0.0;           // 0 ... 1, including the time limit
@@ -63,6 +65,18 @@ struct SessionSnapshot {
     std::vector<float> combined;  // RGBA
 };
 
+struct SessionOptions {
+    unsigned threads = 0;  // 0: one per core
+    // A snapshot is kept at the end of the first pass that reaches each of these.
+    std::vector<std::uint32_t> snapshot_samples;
+    // The film's first sample in each pixel's sequence: shards of one picture start where the one
+    // before ends.
+    std::uint32_t sample_offset = 0;
+    // Of an earlier render (RenderSession::field()): guides all passes alike and learns no more.
+    std::vector<std::byte> field;
+    CheckpointOptions checkpoint;
+};
+
 // A scene that is built already, and a guide that may have learned from earlier pictures. Both
 // belong to the session until it has ended.
 struct BuiltScene {
@@ -74,14 +88,9 @@ struct BuiltScene {
 
 class RenderSession {
   public:
-    // Takes the description; work begins at once on threads of the session. threads 0: one per
-    // core. A snapshot is kept at the end of the first pass that reaches each of
-    // `snapshot_samples`.
-    explicit RenderSession(SceneDescription description,
-                           unsigned threads = 0,
-                           std::vector<std::uint32_t> snapshot_samples = {});
-
-    // Renders a scene that is built already.
+    // Takes the description; work begins at once on threads of the session.
+    explicit RenderSession(SceneDescription description, unsigned threads = 0);
+    RenderSession(SceneDescription description, SessionOptions options);
     RenderSession(const BuiltScene& built, unsigned threads);
     ~RenderSession();
     RenderSession(const RenderSession&) = delete;
@@ -108,8 +117,13 @@ class RenderSession {
     // Throws std::invalid_argument for a wrong size.
     bool read(FilmPass pass, std::span<float> out) const;
 
+    // What the guide has learned, as SessionOptions::field takes it; empty before the end and
+    // without a guide.
+    [[nodiscard]] std::vector<std::byte> field() const;
+
   private:
     struct Impl;
+    struct Work;
     std::unique_ptr<Impl> impl_;
 };
 

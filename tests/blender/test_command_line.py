@@ -22,6 +22,8 @@ harness.add_camera()
 harness.add_object(harness.plane_mesh(half=10.0), harness.emission((0.18, 0.18, 0.18)))
 if sys.argv[-2] == "no_camera":
     scene.camera = None
+scene.pharos.use_checkpoint = sys.argv[-2] == "checkpoint"
+scene.pharos.guiding = "NEURAL" if sys.argv[-2] == "checkpoint" else "OFF"
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-3])
 """
 
@@ -152,6 +154,38 @@ def test_sigterm_keeps_the_picture():
 
 def test_ctrl_c_keeps_the_picture():
     _keeps_the_picture(signal.SIGINT, (1, 130, -signal.SIGINT))
+
+
+def _rendered(scene: Path, output: str, stop_at: int = 0) -> tuple[int, str]:
+    """Exit code and text of an animation of one frame, ended by SIGTERM after so many samples."""
+    process = start(scene, "-o", output, "-F", "OPEN_EXR", "-x", "1", "-s", "1", "-e", "1", "-a")
+    seen = ""
+    for line in process.stdout:
+        seen += line
+        found = _LINE.match(line)
+        if stop_at and found and int(found.group(2)) >= stop_at:
+            process.send_signal(signal.SIGTERM)
+            stop_at = 0
+    return process.wait(120), seen
+
+
+def test_a_stopped_animation_goes_on_to_the_same_picture():
+    scene = make_scene("kept", 48, "checkpoint")
+    whole = FOLDER / "whole" / "frame_0001.exr"
+    parts = FOLDER / "parts" / "frame_0001.exr"
+    assert _rendered(scene, str(whole.parent / "frame_"))[0] == 0 and whole.exists()
+    assert list(whole.parent.iterdir()) == [whole], "a checkpoint was left"
+    for samples in (5, 20):
+        code, text = _rendered(scene, str(parts.parent / "frame_"), samples)
+        assert code == 143, text[-2000:]
+        left = [path.name for path in parts.parent.iterdir()]
+        assert left == ["frame_0001.ViewLayer.pharos_checkpoint"], left
+    code, text = _rendered(scene, str(parts.parent / "frame_"))
+    first = next(int(samples) for _, samples, _ in _LINE.findall(text) if int(samples) > 0)
+    assert code == 0 and first >= 20, (code, first)
+    assert list(parts.parent.iterdir()) == [parts], list(parts.parent.iterdir())
+    pixels = [path.read_bytes()[-320 * 240 :] for path in (whole, parts)]
+    assert pixels[0] == pixels[1]
 
 
 def main() -> int:

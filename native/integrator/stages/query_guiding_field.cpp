@@ -155,14 +155,16 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     if (queries == 0) {
         return 0;
     }
-    batch.mixtures.resize(queries);
+    if (batch.mixtures.size() < queries) {
+        batch.mixtures.resize(queries);
+    }
     const FieldQuery query{batch.query[0],
                            batch.query[1],
                            batch.query[2],
                            batch.query[3],
                            batch.query[4],
                            batch.query[5]};
-    context.guiding.field->evaluate(query, batch.mixtures);
+    context.guiding.field->evaluate(query, std::span(batch.mixtures).first(queries));
     for (std::size_t q = 0; q < queries; ++q) {
         const std::uint32_t s = batch.query_surface[q];
         multiply_by_reflection(batch.query_lobe[q], batch.bsdfs[s].wo, batch.mixtures[q]);

@@ -186,7 +186,10 @@ TEST(RenderSession, TimeLimitStopsAndDelivers) {
 
 TEST(RenderSession, SnapshotsAreShorterRenders) {
     SceneDescription description = room(24, 16, 16);
-    RenderSession session(description, 2, {16, 4});
+    SessionOptions options;
+    options.threads = 2;
+    options.snapshot_samples = {16, 4};
+    RenderSession session(description, options);
     ASSERT_TRUE(session.wait(std::chrono::minutes(4)));
     const auto snapshots = session.snapshots();
     ASSERT_EQ(snapshots.size(), 2u);
