@@ -184,6 +184,15 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         min=0.05,
         soft_max=60.0,
     )
+    compare_seconds: FloatProperty(
+        name="CPU Seconds",
+        description="CPU time of each picture when Pharos is compared with Cycles, all threads "
+        "together; about five times as much is spent in all",
+        default=20.0,
+        min=0.1,
+        soft_max=600.0,
+        step=100,
+    )
     report: CollectionProperty(
         name="Report",
         description="What the last render could not take as given (read only)",

@@ -1,6 +1,7 @@
 // What our tracing costs over a bare Embree loop on the same rays: camera rays in pixel order and
 // rays after some diffuse bounces, in a room of boxes and in a room of fine spheres. Rays are
-// traced in batches of the integrator's size; the bare loop has its queries ready.
+// traced in batches of the integrator's size; the bare loop has its queries ready. `of_bare` is the
+// bare loop's time over ours.
 #include <array>
 #include <cmath>
 #include <memory>
@@ -11,6 +12,7 @@
 #include <benchmark/benchmark.h>
 #include <embree3/rtcore.h>
 
+#include "bench/limits.h"
 #include "geometry/accelerator.h"
 #include "geometry/instance_surface.h"
 #include "geometry/ray_offset.h"
@@ -170,24 +172,6 @@ struct Workload {
     }
 };
 
-void count_rays(benchmark::State& state) {
-    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kRays));
-}
-
-void trace_ours(benchmark::State& state, Room room, Rays kind, RayOrder order) {
-    const Workload work(room, kind);
-    std::vector<Hit> hits(kBatch);
-    const std::span<const std::uint32_t> visibility(work.visibility);
-    for (auto _ : state) {
-        for (std::size_t first = 0; first < kRays; first += kBatch) {
-            const std::span<const Ray> batch = std::span(work.rays).subspan(first, kBatch);
-            work.accelerator->intersect(batch, visibility.first(kBatch), hits, order);
-            benchmark::DoNotOptimize(hits.data());
-        }
-    }
-    count_rays(state);
-}
-
 RTCRayHit bare_query(const Ray& ray) {
     RTCRayHit query{};
     query.ray.org_x = ray.origin.x;
@@ -196,29 +180,70 @@ RTCRayHit bare_query(const Ray& ray) {
     query.ray.dir_x = ray.direction.x;
     query.ray.dir_y = ray.direction.y;
     query.ray.dir_z = ray.direction.z;
-    query.ray.tfar = kInfinity;
+    query.ray.tfar = ray.t_max;
     query.ray.mask = kVisibleAll;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     return query;
 }
 
+// All rays of a workload by Embree alone, time after time.
+class BareLoop {
+  public:
+    explicit BareLoop(const Workload& work) : work_(work) {
+        rtcInitIntersectContext(&context_);
+        for (const Ray& ray : work.rays) {
+            queries_.push_back(bare_query(ray));
+        }
+    }
+
+    void intersect() {
+        for (std::size_t i = 0; i < queries_.size(); ++i) {
+            queries_[i].ray.tfar = work_.rays[i].t_max;
+            queries_[i].hit.geomID = RTC_INVALID_GEOMETRY_ID;
+            rtcIntersect1(work_.scene, &context_, &queries_[i]);
+        }
+        benchmark::DoNotOptimize(queries_.data());
+    }
+
+    void occlude() {
+        for (std::size_t i = 0; i < queries_.size(); ++i) {
+            queries_[i].ray.tfar = work_.rays[i].t_max;
+            rtcOccluded1(work_.scene, &context_, &queries_[i].ray);
+        }
+        benchmark::DoNotOptimize(queries_.data());
+    }
+
+  private:
+    const Workload& work_;
+    RTCIntersectContext context_{};
+    std::vector<RTCRayHit> queries_;
+};
+
+void trace_ours(benchmark::State& state, Room room, Rays kind, RayOrder order) {
+    const Workload work(room, kind);
+    BareLoop bare(work);
+    const double bare_seconds = bench::least_seconds([&] { bare.intersect(); });
+    std::vector<Hit> hits(kBatch);
+    const std::span<const std::uint32_t> visibility(work.visibility);
+    const bench::LoopTime time;
+    for (auto _ : state) {
+        for (std::size_t first = 0; first < kRays; first += kBatch) {
+            const std::span<const Ray> batch = std::span(work.rays).subspan(first, kBatch);
+            work.accelerator->intersect(batch, visibility.first(kBatch), hits, order);
+            benchmark::DoNotOptimize(hits.data());
+        }
+    }
+    bench::set_per_item(state, kRays);
+    time.set_of_bare(state, bare_seconds);
+}
+
 void trace_bare(benchmark::State& state, Room room, Rays kind) {
     const Workload work(room, kind);
-    std::vector<RTCRayHit> queries;
-    for (const Ray& ray : work.rays) {
-        queries.push_back(bare_query(ray));
-    }
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    BareLoop bare(work);
     for (auto _ : state) {
-        for (RTCRayHit& query : queries) {
-            query.ray.tfar = kInfinity;
-            query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-            rtcIntersect1(work.scene, &context, &query);
-        }
-        benchmark::DoNotOptimize(queries.data());
+        bare.intersect();
     }
-    count_rays(state);
+    bench::set_per_item(state, kRays);
 }
 
 void occluded_ours(benchmark::State& state, Room room, Rays kind) {
@@ -226,7 +251,10 @@ void occluded_ours(benchmark::State& state, Room room, Rays kind) {
     for (Ray& ray : work.rays) {
         ray.t_max = 1.0f;  // as far as a near lamp
     }
+    BareLoop bare(work);
+    const double bare_seconds = bench::least_seconds([&] { bare.occlude(); });
     std::vector<std::uint8_t> occluded(kBatch);
+    const bench::LoopTime time;
     for (auto _ : state) {
         for (std::size_t first = 0; first < kRays; first += kBatch) {
             const std::span<const Ray> batch = std::span(work.rays).subspan(first, kBatch);
@@ -234,7 +262,8 @@ void occluded_ours(benchmark::State& state, Room room, Rays kind) {
             benchmark::DoNotOptimize(occluded.data());
         }
     }
-    count_rays(state);
+    bench::set_per_item(state, kRays);
+    time.set_of_bare(state, bare_seconds);
 }
 
 void interactions(benchmark::State& state, Room room, Rays kind) {
@@ -249,7 +278,7 @@ void interactions(benchmark::State& state, Room room, Rays kind) {
             }
         }
     }
-    count_rays(state);
+    bench::set_per_item(state, kRays);
 }
 
 BENCHMARK_CAPTURE(trace_ours, boxes_camera, kBoxes, kCamera, RayOrder::Incoherent);

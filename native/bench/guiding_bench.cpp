@@ -1,18 +1,23 @@
 // What guiding costs: the field per vertex, training per record, sampling and density per
-// direction, on batches as the integrator makes them. One core; items per second are printed as
-// time per item.
+// direction, on batches as the integrator makes them. `of_peak` counts the multiply-adds of the
+// layers alone (three times those of a forward pass for training): encoding, activations, loss and
+// optimiser are what is missing to 1.
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
+#include "bench/limits.h"
 #include "core/parallel.h"
+#include "guiding/encoding.h"
 #include "guiding/guiding_field.h"
+#include "guiding/network_layout.h"
 
 namespace {
 
 using namespace pharos;
+using bench::set_per_item;
 
 // A low-discrepancy sequence is enough for inputs: the golden ratio's fractional parts in d
 // dimensions.
@@ -84,6 +89,17 @@ GuidingConfig config_of(const benchmark::State& state) {
     return config;
 }
 
+// Of the layers, forwards, for one vertex.
+double forward_flops(const GuidingConfig& config) {
+    const NetworkLayout layout = make_network_layout(config);
+    double flops = 0.0;
+    for (int l = 0; l < layout.layers; ++l) {
+        const LayerShape& shape = layout.layer[static_cast<std::size_t>(l)];
+        flops += 2.0 * shape.inputs * shape.outputs;
+    }
+    return flops;
+}
+
 GuidingField trained_field(const GuidingConfig& config) {
     GuidingField field(config, unit_box());
     ThreadPool pool(1);
@@ -93,21 +109,35 @@ GuidingField trained_field(const GuidingConfig& config) {
     return field;
 }
 
-void set_per_item(benchmark::State& state, std::size_t items) {
-    state.counters["per_item"] = benchmark::Counter(
-        static_cast<double>(items),
-        benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
-}
-
 void evaluate_field(benchmark::State& state) {
     const GuidingField field = trained_field(config_of(state));
     const Vertices vertices(1024);
     std::vector<VmfMixture> mixtures(1024);
+    const bench::LoopTime time;
     for (auto _ : state) {
         field.evaluate(vertices.query(), mixtures);
         benchmark::ClobberMemory();
     }
     set_per_item(state, mixtures.size());
+    time.set_of_peak(state, static_cast<double>(mixtures.size()) * forward_flops(config_of(state)));
+}
+
+// The hash grid's; the frequencies are part of the network's kernel.
+void encode_positions(benchmark::State& state) {
+    GuidingConfig config;
+    config.encoding = Encoding::HashGrid;
+    const NetworkLayout layout = make_network_layout(config);
+    const std::vector<float> table(layout.grid_parameters, 0.5f);
+    std::vector<float> features(static_cast<std::size_t>(layout.position_inputs));
+    const Vertices vertices(1024);
+    for (auto _ : state) {
+        for (std::size_t i = 0; i < 1024; ++i) {
+            const Vec3 p(vertices.column[0][i], vertices.column[1][i], vertices.column[2][i]);
+            encode_grid(config, table.data(), p, features.data(), 1);
+            benchmark::DoNotOptimize(features.data());
+        }
+    }
+    set_per_item(state, 1024);
 }
 
 void train_field(benchmark::State& state) {
@@ -115,10 +145,15 @@ void train_field(benchmark::State& state) {
     GuidingField field(config_of(state), unit_box());
     ThreadPool pool(static_cast<unsigned>(state.range(3)));
     std::uint64_t trained = 0;
+    const bench::LoopTime time;
     for (auto _ : state) {
         trained = field.train(records, pool).trained_records;
     }
     set_per_item(state, trained);  // thinned records are not counted, their handling is
+    if (state.range(3) == 1) {
+        time.set_of_peak(state,
+                         3.0 * static_cast<double>(trained) * forward_flops(config_of(state)));
+    }
 }
 
 void sample_directions(benchmark::State& state) {
@@ -171,6 +206,7 @@ BENCHMARK(evaluate_field)
     ->Args({32, 2, 1})
     ->Args({64, 2, 8})
     ->Args({64, 6, 1});
+BENCHMARK(encode_positions);
 BENCHMARK(train_field)
     ->Args({32, 2, 8, 1})
     ->Args({32, 2, 8, 2})

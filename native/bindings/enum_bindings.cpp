@@ -93,7 +93,8 @@ void bind_scene_enums(py::module_& m) {
                              {{"Off", GuidingMode::Off},
                               {"Neural", GuidingMode::Neural},
                               {"Slides", GuidingMode::Slides},
-                              {"SlidesPosition", GuidingMode::SlidesPosition}});
+                              {"SlidesPosition", GuidingMode::SlidesPosition},
+                              {"SlidesMixture", GuidingMode::SlidesMixture}});
     m.attr("VISIBLE_CAMERA") = static_cast<unsigned>(kVisibleCamera);
     m.attr("VISIBLE_DIFFUSE") = static_cast<unsigned>(kVisibleDiffuse);
     m.attr("VISIBLE_GLOSSY") = static_cast<unsigned>(kVisibleGlossy);

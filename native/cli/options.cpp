@@ -14,7 +14,8 @@ namespace pharos::cli {
 namespace {
 
 // In the order of GuidingMode.
-constexpr std::array<const char*, 4> kGuidingNames{"off", "neural", "slides", "slides-position"};
+constexpr std::array<const char*, 5> kGuidingNames{
+    "off", "neural", "slides", "slides-position", "slides-mixture"};
 
 }  // namespace
 
@@ -53,7 +54,8 @@ GuidingMode parse_guiding(const std::string& text) {
             return static_cast<GuidingMode>(i);
         }
     }
-    throw UsageError("--guiding: '" + text + "' is none of off, neural, slides, slides-position");
+    throw UsageError("--guiding: '" + text +
+                     "' is none of off, neural, slides, slides-position, slides-mixture");
 }
 
 const char* guiding_name(GuidingMode mode) {

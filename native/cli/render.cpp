@@ -1,4 +1,5 @@
 // pharos-cli render: a dump file to an EXR, with the statistics benchmarks read.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -59,6 +60,8 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         options.session.checkpoint.interval = parse_number<double>(name, value);
     } else if (name == "--passes") {
         options.passes = parse_passes(value);
+    } else if (name == "--pass-samples") {
+        options.session.pass_samples = std::max(1u, parse_number<std::uint32_t>(name, value));
     } else if (name == "--stats-json") {
         options.stats_json = value;
     } else {
@@ -159,13 +162,16 @@ void print_guide(const GuideStatus& guide) {
                 static_cast<unsigned long long>(guide.skipped_steps));
 }
 
-void write_statistics_json(const RenderSession& session, const std::string& path) {
+void write_statistics_json(const RenderSession& session,
+                           double read_seconds,
+                           const std::string& path) {
     const SessionStatistics statistics = session.statistics();
     std::ofstream out(path);
     out.precision(9);
     const GuideStatus guide = session.progress().guiding;
     out << "{\n  \"camera_samples\": " << statistics.camera_samples
         << ",\n  \"vertices\": " << statistics.vertices << ",\n  \"rays\": " << statistics.rays
+        << ",\n  \"read_seconds\": " << read_seconds
         << ",\n  \"build_seconds\": " << statistics.build_seconds
         << ",\n  \"render_cpu_seconds\": " << statistics.render_cpu_seconds
         << ",\n  \"nonfinite_samples\": " << session.progress().nonfinite_samples
@@ -182,7 +188,8 @@ void write_statistics_json(const RenderSession& session, const std::string& path
     for (const SessionSnapshot& snapshot : snapshots) {
         out << (&snapshot == snapshots.data() ? "\n" : ",\n")
             << "    {\"samples\": " << snapshot.samples
-            << ", \"cpu_seconds\": " << snapshot.cpu_seconds << "}";
+            << ", \"cpu_seconds\": " << snapshot.cpu_seconds
+            << ", \"wall_seconds\": " << snapshot.wall_seconds << "}";
     }
     out << "\n  ]\n}\n";
     if (!out.flush()) {
@@ -275,7 +282,10 @@ void require_success(const RenderSession& session, const Options& options) {
 
 int render(const std::vector<std::string>& arguments) {
     Options options = parse(arguments);
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
     SceneDescription description = load(options);
+    const double read_seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     if (!options.field.empty()) {
         options.session.field = read_bytes(options.field);
     }
@@ -299,7 +309,7 @@ int render(const std::vector<std::string>& arguments) {
         print_guide(session.progress().guiding);
     }
     if (!options.stats_json.empty()) {
-        write_statistics_json(session, options.stats_json);
+        write_statistics_json(session, read_seconds, options.stats_json);
     }
     return code;
 }

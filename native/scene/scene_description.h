@@ -51,8 +51,9 @@ struct WorldDescription {
 enum class GuidingMode : std::uint32_t {
     Off,
     Neural,
-    Slides,         // the thesis' model: one lobe
-    SlidesPosition  // of the position alone, for comparison
+    Slides,          // the thesis' model: one lobe
+    SlidesPosition,  // of the position alone, for comparison
+    SlidesMixture,   // its loss on as many lobes as Neural has, for comparison
 };
 
 struct RenderSettings {

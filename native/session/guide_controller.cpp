@@ -52,6 +52,11 @@ GuidingConfig guiding_config(GuidingMode mode) {
             return GuidingConfig::slides();
         case GuidingMode::SlidesPosition:
             return GuidingConfig::slides(false);
+        case GuidingMode::SlidesMixture: {
+            GuidingConfig config = GuidingConfig::slides();
+            config.lobes = GuidingConfig::neural().lobes;
+            return config;
+        }
     }
     return GuidingConfig::neural();
 }

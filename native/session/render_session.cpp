@@ -296,7 +296,8 @@ void RenderSession::Impl::render_passes(const RenderSettings& settings,
                                         std::chrono::duration<float>(settings.time_limit));
         }
         PassSettings pass = next_pass(done, settings.samples, pixels);
-        pass.samples = std::min(pass.samples, work.guide.most_samples(done));
+        pass.samples =
+            std::min({pass.samples, work.guide.most_samples(done), options.pass_samples});
         pass.weight = work.guide.weight(done);
         pass.offset = options.sample_offset;
         if ((done > 0 && stop.reached()) || !render_pass(pass, stop, work)) {
@@ -378,7 +379,8 @@ void RenderSession::Impl::finish_pass(const Work& work) {
     statistics.render_cpu_seconds = process_cpu_seconds() - work.cpu_begin;
     const std::vector<std::uint32_t>& wanted = options.snapshot_samples;
     while (snapshots.size() < wanted.size() && wanted[snapshots.size()] <= work.position.done) {
-        SessionSnapshot snapshot{work.position.done, statistics.render_cpu_seconds, {}};
+        SessionSnapshot snapshot{
+            work.position.done, statistics.render_cpu_seconds, seconds_since(*render_begin), {}};
         snapshot.combined.resize(std::size_t{width} * height * 4);
         film->film.read(FilmPass::Combined, snapshot.combined);
         snapshots.push_back(std::move(snapshot));

@@ -62,6 +62,7 @@ struct SessionStatistics {
 struct SessionSnapshot {
     std::uint32_t samples = 0;
     double cpu_seconds = 0.0;     // of passes and training up to here
+    double wall_seconds = 0.0;    // since the start of rendering
     std::vector<float> combined;  // RGBA
 };
 
@@ -69,6 +70,7 @@ struct SessionOptions {
     unsigned threads = 0;  // 0: one per core
     // A snapshot is kept at the end of the first pass that reaches each of these.
     std::vector<std::uint32_t> snapshot_samples;
+    std::uint32_t pass_samples = 0xffffffffu;  // of a pass, at most
     // The film's first sample in each pixel's sequence: shards of one picture start where the one
     // before ends.
     std::uint32_t sample_offset = 0;

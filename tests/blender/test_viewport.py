@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
-import traceback
 
 import bpy
 import harness
 import numpy as np
+import steps
 
 SHOT = harness.TEMPORARY / "shot.png"
+_escape = {"pressed": 0.0, "looks": 0}
 
 
 def area():
@@ -266,14 +266,15 @@ def step_cancel_render():
     """Esc as a user presses it."""
     assert bpy.app.is_job_running("RENDER"), "the render is not under way"
     os.system("xdotool key Escape")
-    _state["cancelled"] = time.monotonic()
+    _escape["pressed"] = time.monotonic()
 
 
 def step_render_has_stopped():
-    if _state["tries"] % 15 == 14:
+    _escape["looks"] += 1
+    if _escape["looks"] % 15 == 0:
         os.system("xdotool key Escape")  # a busy X server may have lost the first
     assert not bpy.app.is_job_running("RENDER"), "Esc did not stop the render"
-    harness.say(f"MEASURED Esc to end: under {time.monotonic() - _state['cancelled']:.2f} s")
+    harness.say(f"MEASURED Esc to end: under {time.monotonic() - _escape['pressed']:.2f} s")
 
 
 def step_report_arrives():
@@ -302,45 +303,4 @@ def step_new_file():
     bpy.ops.wm.read_homefile(use_factory_startup=False)
 
 
-STEPS = [function for name, function in globals().items() if name.startswith("step_")]
-_INTERVAL = 0.4
-_MOST_TRIES = 75
-_state = {"tries": 0}
-
-
-def fail(function, error) -> None:
-    traceback.print_exc()
-    harness.say(f"FAIL {function.__name__}: {type(error).__name__}: {error}")
-    finish(1)
-
-
-def finish(code: int) -> None:
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
-def run_next() -> float:
-    """One step, again and again while what it expects has not come yet; a failure ends the process,
-    as an exception in a timer would leave it running."""
-    if not STEPS:
-        finish(0)
-    function = STEPS[0]
-    try:
-        function()
-    except AssertionError as error:
-        _state["tries"] += 1
-        if _state["tries"] < _MOST_TRIES:
-            return _INTERVAL
-        fail(function, error)
-    except BaseException as error:
-        fail(function, error)
-    harness.say(f"PASS {function.__name__}")
-    _state["tries"] = 0
-    STEPS.pop(0)
-    return _INTERVAL
-
-
-harness.enable_addon()
-bpy.context.preferences.view.show_splash = False
-bpy.app.timers.register(run_next, first_interval=1.0, persistent=True)
+steps.main(globals())

@@ -1,14 +1,18 @@
-"""Renders one scene with Cycles of bpy, all asked-for budgets in one process; JSON lines come back.
+"""Renders one scene with Cycles of bpy or Blender, all asked-for budgets in one process.
 
     python cycles_worker.py SCENE.blend OUT_FOLDER '{"guiding": false, "runs": [[64, 1], ...], ...}'
 
-Each line: {"samples", "seed", "seconds" (CPU of the render call / threads), "image" (.npy)}.
+JSON lines come back: one `START` with the seconds to the open file, those of preparing the scene
+and one sample, and the memory before; then a `ROW` for each picture: {"samples", "seed", "seconds"
+(CPU of the render call / threads), "wall", "memory" (peak, MiB), "image" (.npy)}.
 A first small render is not counted: it loads kernels and lets the threads start.
 """
 
 import json
 import os
+import resource
 import sys
+import time
 from pathlib import Path
 
 import bpy
@@ -48,8 +52,17 @@ def prepare(job):
     return scene
 
 
+def say(word, fields):
+    sys.stdout.write(f"{word} {json.dumps(fields)}\n")
+    sys.stdout.flush()
+
+
+def peak_memory():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def render_once(scene, samples, seed, path):
-    """CPU seconds of the whole process in the render call, and the linear picture."""
+    """CPU and wall seconds of the whole process in the render call, and the linear picture."""
     scene.cycles.samples, scene.cycles.seed = samples, seed
     scene.render.filepath = str(path)
     before = os.times()
@@ -62,22 +75,26 @@ def render_once(scene, samples, seed, path):
     bpy.data.images.remove(picture)
     path.unlink()
     seconds = after.user + after.system - before.user - before.system
-    return seconds, pixels.reshape(height, width, -1)[..., :3]
+    return seconds, after.elapsed - before.elapsed, pixels.reshape(height, width, -1)[..., :3]
 
 
 def main():
-    blend, folder, job = sys.argv[1], Path(sys.argv[2]), json.loads(sys.argv[3])
+    arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
+    blend, folder, job = arguments[0], Path(arguments[1]), json.loads(arguments[2])
     bpy.ops.wm.open_mainfile(filepath=blend)
     scene = prepare(job)
+    ready, memory = time.time(), peak_memory()
     scratch = folder / f"scratch_{os.getpid()}.exr"
     render_once(scene, 1, 0, scratch)
+    build, _, _ = render_once(scene, 1, 0, scratch)
+    say("START", {"startup": ready - job["began"], "build": build / job["threads"],
+                  "memory_before": memory})
     for samples, seed in job["runs"]:
-        seconds, pixels = render_once(scene, samples, seed, scratch)
+        seconds, wall, pixels = render_once(scene, samples, seed, scratch)
         image = folder / f"{job['name']}_{samples}_{seed}.npy"
         np.save(image, pixels)
-        row = {"samples": samples, "seed": seed, "seconds": seconds / job["threads"],
-               "image": str(image)}
-        print("ROW " + json.dumps(row), flush=True)
+        say("ROW", {"samples": samples, "seed": seed, "seconds": seconds / job["threads"],
+                    "wall": wall, "memory": peak_memory(), "image": str(image)})
 
 
 if __name__ == "__main__":

@@ -1,16 +1,20 @@
 """Writes the scene of a .blend file as a dump, by the add-on in bpy, under the common conditions.
 
-    python dump_worker.py SCENE.blend OUT WIDTH HEIGHT BOUNCES
+    python dump_worker.py SCENE.blend OUT WIDTH HEIGHT BOUNCES BEGAN
+
+Says what that took: from BEGAN (seconds since 1970) to the open file, and for the export.
 """
 
+import json
 import os
 import sys
+import time
 
 import bpy
 
 
 def main():
-    blend, out, width, height, bounces = sys.argv[1:6]
+    blend, out, width, height, bounces, began = sys.argv[1:7]
     import addon_utils  # on the path only once bpy is there
 
     bpy.ops.wm.open_mainfile(filepath=blend)
@@ -30,7 +34,10 @@ def main():
     settings.max_bounces = int(bounces)
     for kind in ("diffuse", "glossy", "transmission", "transparent"):
         setattr(settings, f"{kind}_bounces", int(bounces))
+    ready = time.time()
     bpy.ops.pharos.dump(filepath=out)
+    took = {"startup": ready - float(began), "seconds": time.time() - ready}
+    sys.stdout.write(f"EXPORTED {json.dumps(took)}\n")
 
 
 if __name__ == "__main__":

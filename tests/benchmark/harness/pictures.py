@@ -11,10 +11,11 @@ def _said(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
-def read_exr(path):
-    """R, G, B as (height, width, 3) float32, bottom row first as Blender keeps them."""
-    named = "Combined." if "Combined.R" in _said("oiiotool", "--info", "-v", str(path)) else ""
-    channels = ",".join(named + letter for letter in "RGB")
+def read_exr(path, layer="Combined", letters="RGB"):
+    """Three channels as (height, width, 3) float32, bottom row first as Blender keeps them."""
+    first = f"{layer}.{letters[0]}"
+    named = f"{layer}." if first in _said("oiiotool", "--info", "-v", str(path)) else ""
+    channels = ",".join(named + letter for letter in letters)
     with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder) / "plain.tif"
         command = ["oiiotool", str(path), "--ch", channels, "--flip", "-d", "float",

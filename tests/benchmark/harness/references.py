@@ -2,6 +2,8 @@
 
 Each engine is measured against a reference of its own renderer, so that a difference in look does
 not count as noise. With two halves the noise of the reference cancels from the error (metric.py).
+A scene that is the middle of a larger one at half its resolution needs no references of its own:
+with a box filter of one pixel, four pixels of the larger picture are one of the smaller.
 """
 
 import json
@@ -38,21 +40,28 @@ def _store(path, samples, mean):
 
 def _options(scene, program):
     hard = scene.name in HARD
-    if program == "cycles":
-        return {"guiding": hard}
+    if program.startswith("cycles"):
+        return {"guiding": hard and program == "cycles"}
     return {"guiding": "NEURAL" if hard else "OFF"}
 
 
-def samples_of(scene, program):
-    """Samples a pixel of both halves together."""
-    folder = _folder(scene, program)
-    return sum(_load(folder / f"half{half}.npz")[0] for half in (0, 1))
+def from_larger(picture, resolution):
+    """The middle rows of a picture of at least twice the height and exactly twice the width."""
+    width, height = resolution
+    rows, columns, channels = picture.shape
+    first = (rows - 2 * height) // 2
+    if columns != 2 * width or rows < 2 * height or (rows - 2 * height) % 2:
+        raise ValueError(f"{columns} x {rows} pixels do not give {width} x {height}")
+    middle = picture[first:first + 2 * height]
+    return middle.reshape(height, 2, width, 2, channels).mean(axis=(1, 3))
 
 
 def ensure(scene, program, samples, threads, log=lambda text: None):
     """Both halves with at least `samples` samples a pixel each, as a pair of float64 pictures."""
+    if scene.larger:
+        pair = ensure(scene.larger, program, -(-samples // 4), threads, log)
+        return [from_larger(half, scene.resolution) for half in pair]
     folder = _folder(scene, program)
-    run = engines.render_cycles if program == "cycles" else engines.render_pharos
     pair = []
     for half in (0, 1):
         path = folder / f"half{half}.npz"
@@ -61,7 +70,8 @@ def ensure(scene, program, samples, threads, log=lambda text: None):
             chunk = min(CHUNK, samples - have)
             log(f"reference {program} {scene.name} half {half + 1}: {have} of {samples} samples")
             seed = SEED_STEP * (half + 1) + have
-            shot = run(scene, _options(scene, program), [(chunk, seed)], threads)[0]
+            run = engines.PROGRAMS[program]
+            shot = next(iter(run(scene, _options(scene, program), [(chunk, seed)], threads)))
             pixels = shot.pixels.astype(np.float64)
             mean = pixels if mean is None else (mean * have + pixels * chunk) / (have + chunk)
             have += chunk

@@ -71,8 +71,10 @@ TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
 }
 
 TEST(GuidedStatistics, LearningKeepsTheClosedForm) {
-    for (const GuidingMode mode :
-         {GuidingMode::Neural, GuidingMode::Slides, GuidingMode::SlidesPosition}) {
+    for (const GuidingMode mode : {GuidingMode::Neural,
+                                   GuidingMode::Slides,
+                                   GuidingMode::SlidesPosition,
+                                   GuidingMode::SlidesMixture}) {
         SceneDescription description = emitting_box(48, 32);
         description.settings.guiding = mode;
         description.settings.samples = 256;
@@ -86,8 +88,10 @@ TEST(GuidedStatistics, LearningKeepsTheClosedForm) {
 }
 
 TEST(Guided, IsBitEqualForAnyNumberOfThreads) {
-    for (const GuidingMode mode :
-         {GuidingMode::Neural, GuidingMode::Slides, GuidingMode::SlidesPosition}) {
+    for (const GuidingMode mode : {GuidingMode::Neural,
+                                   GuidingMode::Slides,
+                                   GuidingMode::SlidesPosition,
+                                   GuidingMode::SlidesMixture}) {
         SceneDescription description = two_rooms(61, 47, 24);
         description.settings.guiding = mode;
         const Rendered one = render(description, 1);

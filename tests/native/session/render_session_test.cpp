@@ -184,6 +184,24 @@ TEST(RenderSession, TimeLimitStopsAndDelivers) {
     EXPECT_LT(seconds, kBar);
 }
 
+TEST(RenderSession, PassesAreNoLongerThanAsked) {
+    SceneDescription description = room(24, 16, 16);
+    description.settings.guiding = GuidingMode::Slides;
+    SessionOptions options;
+    options.threads = 2;
+    options.pass_samples = 1;
+    options.snapshot_samples = {3, 7, 11, 13};
+    RenderSession session(std::move(description), options);
+    ASSERT_TRUE(session.wait(std::chrono::minutes(4)));
+    const auto snapshots = session.snapshots();
+    ASSERT_EQ(snapshots.size(), 4u);
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(snapshots[i].samples, options.snapshot_samples[i]);
+    }
+    EXPECT_GE(snapshots[3].wall_seconds, snapshots[0].wall_seconds);
+    EXPECT_GE(session.progress().guiding.snapshots, 10u);  // it has learned after every sample
+}
+
 TEST(RenderSession, SnapshotsAreShorterRenders) {
     SceneDescription description = room(24, 16, 16);
     SessionOptions options;
