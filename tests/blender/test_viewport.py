@@ -167,15 +167,18 @@ def step_learn_lobes():
     area().spaces[0].region_3d.view_location = (0.0, 0.0, 0.0)
 
 
+_asked: dict = {}  # the question, and what was shown before its answer
+
+
 def step_ask_lobes():
     from pharos import lobes
 
     session = viewport().session
     assert session.wait(0.0) and session.progress().render.guiding.snapshots > 0
     region = window_region()
-    _state["question"] = lobes.ask(viewport(), 0.5 * region.width, 0.5 * region.height)
-    assert _state["question"] > 0
-    _state["before"] = screenshot()
+    _asked["question"] = lobes.ask(viewport(), 0.5 * region.width, 0.5 * region.height)
+    assert _asked["question"] > 0
+    _asked["before"] = screenshot()
 
 
 def step_lobes_are_drawn():
@@ -183,10 +186,10 @@ def step_lobes_are_drawn():
 
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, area=area(), region=window_region()):
-        assert lobes.show_answer(viewport(), bpy.context, _state["question"])
+        assert lobes.show_answer(viewport(), bpy.context, _asked["question"])
     probe = lobes.overlay.probe
     assert probe.hit and probe.lobes, lobes.words(probe)
-    changed = np.abs(screenshot() - _state["before"]).max(-1) > 40
+    changed = np.abs(screenshot() - _asked["before"]).max(-1) > 40
     assert changed.sum() > 30, f"{changed.sum()} pixels changed"
 
 
