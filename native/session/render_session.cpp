@@ -101,7 +101,7 @@ struct RenderSession::Work {
     RenderPosition position;
     std::uint64_t nonfinite_before = 0;  // in the checkpoint it went on from
     double cpu_begin = process_cpu_seconds();
-    std::function<void(const GuideController&)> after_pass;
+    std::function<void(const GuideController&)> after_pass = {};
 };
 
 struct RenderSession::Impl {
@@ -258,7 +258,9 @@ void RenderSession::Impl::render(const Scene& scene,
     std::optional<GuideController> own_guide;
     GuideController& guide = built != nullptr ? built->guide : own_guide.emplace(make_guide(scene));
     Work work{pool, integrator, *shared_film, guide, {}};
-    work.after_pass = built != nullptr ? built->after_pass : nullptr;
+    if (built != nullptr) {
+        work.after_pass = built->after_pass;
+    }
     CheckpointKeeper keeper(options.checkpoint, identity);
     resume(scene, keeper, work);
     {

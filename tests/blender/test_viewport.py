@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import subprocess
 import time
+from pathlib import Path
 
 import bpy
 import harness
@@ -240,11 +241,22 @@ def step_close_area():
             bpy.ops.screen.area_close()
 
 
+def thread_count() -> int:
+    return sum(1 for _ in Path("/proc/self/task").iterdir())
+
+
 def step_toggle_shading():
-    for _ in range(8):
-        for kind in ("SOLID", "RENDERED"):
+    shade("SOLID")
+    _asked["threads"] = thread_count()
+    for _ in range(15):
+        for kind in ("RENDERED", "SOLID"):
             shade(kind)
             bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
+def step_no_thread_is_left():
+    assert thread_count() <= _asked["threads"], (thread_count(), _asked["threads"])
+    shade("RENDERED")
 
 
 def step_switch_engine():
