@@ -9,9 +9,18 @@ bl_info = {
     "category": "Render",
 }
 
-from . import checkpoints, compare, engine, handlers, operators, panels, properties  # noqa: E402
+from . import (  # noqa: E402
+    checkpoints,
+    compare,
+    engine,
+    handlers,
+    lobes,
+    operators,
+    panels,
+    properties,
+)
 
-_PARTS = (properties, engine, operators, panels, compare, handlers, checkpoints)
+_PARTS = (properties, engine, operators, lobes, panels, compare, handlers, checkpoints)
 
 
 def register():

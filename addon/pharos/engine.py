@@ -60,22 +60,24 @@ class PharosRenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, f"Pharos: {type(error).__name__}: {error}")
 
     def view_update(self, context, depsgraph):
-        viewport = self._ensure_viewport()
+        viewport = self._ensure_viewport(depsgraph.scene)
         if viewport is not None:
-            viewport.scene_changed(depsgraph)
+            viewport.scene_changed(context, depsgraph)
 
     def view_draw(self, context, depsgraph):
-        viewport = self._ensure_viewport()
+        viewport = self._ensure_viewport(depsgraph.scene)
         if viewport is not None:
             viewport.draw(self, context, depsgraph)
 
-    def _ensure_viewport(self):
+    def _ensure_viewport(self, scene):
         module, problem = native.load()
         if module is None:
             self.update_stats("Pharos", problem)
             return None
         if getattr(self, "_viewport", None) is None:
-            self._viewport = Viewport(module)
+            render = scene.render
+            threads = render.threads if render.threads_mode == "FIXED" else 0
+            self._viewport = Viewport(module, threads)
         return self._viewport
 
 

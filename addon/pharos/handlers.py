@@ -14,6 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 _waiting: queue.SimpleQueue = queue.SimpleQueue()
+_epoch = [0]  # grows whenever pointers may stand for other things than before
 _DUMP_ARGUMENT = "--pharos-dump"
 _RENDER_ARGUMENTS = {"-f", "--render-frame", "-a", "--render-anim"}
 
@@ -34,6 +35,27 @@ def post_report(scene_name: str, entries) -> None:
     _waiting.put((scene_name, entries))
     if bpy.app.background:
         _deliver()
+
+
+def edit_epoch() -> int:
+    """Grows with every undo, redo and loaded file."""
+    return _epoch[0]
+
+
+@persistent
+def _begin_epoch(*_):
+    _epoch[0] += 1
+
+
+def _epoch_handlers() -> list:
+    handlers = bpy.app.handlers
+    return [
+        handlers.undo_pre,
+        handlers.undo_post,
+        handlers.redo_pre,
+        handlers.redo_post,
+        handlers.load_post,
+    ]
 
 
 def _deliver() -> float:
@@ -67,6 +89,8 @@ def _dump_after_load(*_):
 
 
 def register():
+    for handler in _epoch_handlers():
+        handler.append(_begin_epoch)
     if not bpy.app.background:
         bpy.app.timers.register(_deliver, first_interval=0.5, persistent=True)
     elif dump_argument() and not _renders_by_argument():
@@ -76,5 +100,8 @@ def register():
 def unregister():
     if bpy.app.timers.is_registered(_deliver):
         bpy.app.timers.unregister(_deliver)
+    for handler in _epoch_handlers():
+        if _begin_epoch in handler:
+            handler.remove(_begin_epoch)
     if _dump_after_load in bpy.app.handlers.load_post:
         bpy.app.handlers.load_post.remove(_dump_after_load)

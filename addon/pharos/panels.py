@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import compat, native
+from . import compat, denoise, native
 
 _ENGINE = "PHAROS"
 
@@ -126,6 +126,12 @@ class PHAROS_RENDER_PT_sampling(_RenderPanel, bpy.types.Panel):
         own.prop(settings, "seed")
         layout.prop(settings, "time_limit")
         layout.prop(settings, "use_guiding")
+        problem = denoise.load().problem
+        row = layout.row()
+        row.enabled = not problem
+        row.prop(settings, "use_preview_denoising")
+        if problem:
+            layout.label(text=problem, icon="INFO")
 
 
 class PHAROS_RENDER_PT_advanced(_RenderPanel, bpy.types.Panel):

@@ -75,6 +75,12 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
     preview_samples: _samples(
         "Viewport Samples", "Samples of each pixel in the viewport; 0 goes on without end", 1024, 0
     )
+    use_preview_denoising: BoolProperty(
+        name="Denoise Viewport",
+        description="Show the viewport's picture without its noise, by the library that comes with "
+        "Blender. The samples stay as they are",
+        default=False,
+    )
     seed: IntProperty(
         name="Seed",
         description="Another seed gives other noise; the same seed gives the same picture",

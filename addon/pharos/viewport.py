@@ -1,7 +1,8 @@
-"""The rendered viewport: a session per state of scene and view, its newest picture as a texture.
+"""The rendered viewport: a live session that follows scene and view, its picture as a texture.
 
-Any edit exports the scene anew; a moved view reuses the export. Native threads never touch Blender:
-a timer on the main thread looks for new pictures and asks for a redraw.
+An edit walks over the scene again, but hands over only what the session does not hold; a moved view
+exports nothing. Native threads never touch Blender: a timer on the main thread looks for new
+pictures and asks for a redraw.
 """
 
 from __future__ import annotations
@@ -10,155 +11,163 @@ import time
 import weakref
 
 import bpy
-import numpy as np
 
-from . import handlers, output
-from .export.camera import Crop, Frame, View, depth_of_field, projected_window, rigid
+from . import compat, denoise, handlers
+from .export.library import Library
 from .export.report import Report
 from .export.scene import export_scene, set_view
 from .export.settings import viewport_samples
 from .final import stats_line
-from .passes import PASSES
+from .view_state import ViewState
 
 _SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
 _LONGEST_INTERVAL = 0.5
-_PATIENCE = 0.5  # seconds that the last picture stands in for an unfinished one
 _DRAWING_SHARE = 0.25  # most of the time may go into rendering, not into showing it
 
-
-class ViewState:
-    """All that the picture depends on beside the scene; compared as a tuple."""
-
-    def __init__(self, native, context):
-        region, data, space = context.region, context.region_data, context.space_data
-        self.width, self.height = max(region.width, 1), max(region.height, 1)
-        self._projection = np.array(data.window_matrix, np.float64)
-        self._matrix = rigid(data.view_matrix.inverted())
-        self._native = native
-        self._clip = (space.clip_start, space.clip_end)
-        self._lens: dict = {}
-        camera = space.camera if data.view_perspective == "CAMERA" else None
-        if camera is not None and camera.type == "CAMERA":
-            self._clip = (camera.data.clip_start, camera.data.clip_end)
-            self._lens = depth_of_field(camera.data, self._matrix)
-
-    @property
-    def key(self) -> tuple:
-        return (
-            self.width,
-            self.height,
-            self._projection.tobytes(),
-            self._matrix.tobytes(),
-            self._clip,
-            tuple(self._lens.items()),
-        )
-
-    def view(self) -> View:
-        window = projected_window(self._projection)
-        perspective = self._projection[3, 3] == 0.0
-        kinds = self._native.CameraType
-        fields = {
-            "type": kinds.Perspective if perspective else kinds.Orthographic,
-            "to_world": self._matrix.tolist(),
-            "window_lower": window.lower,
-            "window_upper": window.upper,
-            # An orthographic viewport also shows what lies behind the point it turns about.
-            "near_clip": self._clip[0] if perspective else -self._clip[1],
-            "far_clip": self._clip[1],
-            **self._lens,
-        }
-        frame = Frame(self.width, self.height)
-        return View(fields, frame, Crop(0, 0, self.width, self.height))
+_open: weakref.WeakSet = weakref.WeakSet()  # viewports that may be found by their area
 
 
 class Viewport:
     """One viewport of one engine object; close() may be called at any time, also twice."""
 
-    def __init__(self, native):
+    def __init__(self, native, threads: int):
         self._native = native
-        self._description = None
-        self._session = None
-        self._view_key = None
-        self._drawn_serial = 0
+        self._session = native.LiveSession(threads)
+        self._library = Library()
+        self._epoch = handlers.edit_epoch()
+        self._area = None  # pointer of the area that shows it
+        self._has_scene = False
+        self._sent_full = True  # the last scene came with all its content
+        self._crop = None  # of the picture last asked for
+        self._drawn = None  # serial and crop of the texture
         self._picture = None
         self._texture = None
-        self._report = Report()
+        self._denoiser = None
+        self._denoised = 0  # number of the picture that was shown without noise
         self._paused = False  # a final render has the processor
         self._interval = _SHORTEST_INTERVAL
+        _open.add(self)
         self._start_timer()
 
-    def close(self) -> None:
-        self._session = self._description = self._texture = self._picture = None
+    @property
+    def area(self) -> int | None:
+        return self._area
 
-    def scene_changed(self, depsgraph) -> None:
-        self._session = self._description = None
-        self._report = Report()
+    @property
+    def crop(self):
+        """The part of the region that is rendered."""
+        return self._crop
+
+    @property
+    def session(self):
+        return self._session
+
+    def close(self) -> None:
+        self._session = self._texture = self._picture = None
+
+    def scene_changed(self, context, depsgraph) -> None:
+        """Hand over the scene as it is now."""
+        library = self._library
+        if self._session.progress().lost_scene:
+            library.clear()
+        self._sent_full = library.is_empty
+        if handlers.edit_epoch() != self._epoch:
+            self._epoch = handlers.edit_epoch()
+            library.forget_places()
+        library.tag(depsgraph.updates)
+        report = Report()
+        complete = False
+        library.begin()
         try:
-            self._description = export_scene(self._native, depsgraph, self._report)
+            description = export_scene(self._native, depsgraph, report, library=library)
+            self._set_view(description, ViewState(self._native, context), depsgraph)
+            self._session.set_scene(description)
+            library.end()
+            self._has_scene = complete = True
         finally:
-            handlers.post_report(depsgraph.scene.name, self._report.entries)
+            if not complete:
+                library.clear()
+            handlers.post_report(depsgraph.scene.name, report.entries)
 
     def has_news(self) -> bool:
-        return self._session is not None and self._session.progress().serial != self._drawn_serial
+        if self._session is None:
+            return False
+        if self._denoiser is not None and self._denoiser.is_ready:
+            return True
+        serial = self._session.progress().render.serial
+        return self._drawn is None or serial != self._drawn[0]
 
     def yield_to_render(self) -> None:
         """Stop while a final render is under way; go on from the start afterwards."""
         rendering = bpy.app.is_job_running("RENDER")
-        if rendering and not self._paused:
-            self._session = None
-        elif self._paused and not rendering:
-            redraw_viewports()
-        self._paused = rendering
+        if rendering != self._paused and self._session is not None:
+            self._session.set_paused(rendering)
+            self._paused = rendering
 
     def draw(self, engine, context, depsgraph) -> None:
-        if self._paused:
-            self._draw_texture(engine, context, depsgraph)
+        if self._session is None:
             return
         began = time.monotonic()
-        if self._description is None:
-            self.scene_changed(depsgraph)
+        self._area = context.area.as_pointer()
+        lost = self._session.progress().lost_scene and not self._sent_full
+        if lost or not self._has_scene:
+            self.scene_changed(context, depsgraph)
         state = ViewState(self._native, context)
-        if self._session is None or state.key != self._view_key:
-            self._restart(state, depsgraph)
+        view = self._native.SceneDescription(compat.version_number())
+        self._set_view(view, state, depsgraph)
+        self._session.set_view(view)
+        self._crop = state.crop
+        self._choose_denoiser(depsgraph.scene)
         self._update_texture()
         self._draw_texture(engine, context, depsgraph)
         progress = self._session.progress()
-        failed = progress.state == self._native.SessionState.Failed
-        engine.update_stats("", progress.error if failed else stats_line(progress))
+        failed = progress.render.state == self._native.SessionState.Failed
+        engine.update_stats("", progress.render.error if failed else live_line(progress))
         wished = (time.monotonic() - began) / _DRAWING_SHARE
         self._interval = min(max(wished, _SHORTEST_INTERVAL), _LONGEST_INTERVAL)
 
-    def _restart(self, state: ViewState, depsgraph) -> None:
-        self._session = None  # its threads have ended when this returns
+    def _set_view(self, description, state: ViewState, depsgraph) -> None:
         scene = depsgraph.scene_eval
-        description = self._description.copy()
         set_view(self._native, description, scene, state.view())
         description.set_settings(samples=viewport_samples(scene), time_limit=0.0)
-        render = scene.render
-        threads = render.threads if render.threads_mode == "FIXED" else 0
-        self._session = self._native.RenderSession(description, threads)
-        self._view_key = state.key
-        self._drawn_serial = 0
+
+    def _choose_denoiser(self, scene) -> None:
+        oidn = denoise.load().oidn if scene.pharos.use_preview_denoising else None
+        if oidn is None:
+            self._denoiser, self._denoised = None, 0
+        elif self._denoiser is None:
+            self._denoiser = denoise.Denoiser(oidn)
+            self._drawn = None
 
     def _update_texture(self) -> None:
+        if not self.has_news():
+            return
+        progress = self._session.progress()
+        if self._denoiser is not None and (done := self._denoiser.take()) is not None:
+            pixels, picture = done
+            if picture == progress.pictures:
+                self._show(pixels)
+                self._denoised = picture
+        found = self._session.picture()
+        if found is None:
+            return  # the last picture looks better than nothing
+        pixels, serial = found
+        if self._denoiser is not None and progress.render.samples > 0:
+            if self._denoiser.busy:
+                return  # this one, or what it has become, is taken when the thread is free
+            self._denoiser.start(pixels, progress.pictures)
+        self._drawn = serial, self._crop
+        if self._denoised != progress.pictures:
+            self._show(pixels)
+
+    def _show(self, pixels) -> None:
         import gpu  # not there in background mode of newer versions
 
-        session = self._session
-        progress = session.progress()
-        if progress.serial == self._drawn_serial:
-            return
-        # Until each pixel has a sample the last picture looks better, but not for long.
-        if progress.samples == 0 and progress.elapsed < _PATIENCE:
-            return
-        pixels = output.read_pass(self._native, session, PASSES[0])
-        if pixels is None:
-            return
-        size = (session.width, session.height)
+        height, width = pixels.shape[:2]
         # The buffer refers to the array: both live as long as the texture.
         self._picture = pixels
         buffer = gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
-        self._texture = gpu.types.GPUTexture(size, format="RGBA16F", data=buffer)
-        self._drawn_serial = progress.serial
+        self._texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)
 
     def _draw_texture(self, engine, context, depsgraph) -> None:
         """The last picture there is, stretched while a new size has none yet."""
@@ -167,9 +176,10 @@ class Viewport:
 
         if self._texture is None:
             return
+        crop = self._crop
         gpu.state.blend_set("ALPHA_PREMULT")
         engine.bind_display_space_shader(depsgraph.scene)
-        draw_texture_2d(self._texture, (0, 0), context.region.width, context.region.height)
+        draw_texture_2d(self._texture, (crop.x, crop.y), crop.width, crop.height)
         engine.unbind_display_space_shader()
         gpu.state.blend_set("NONE")
 
@@ -178,18 +188,31 @@ class Viewport:
 
         def look() -> float | None:
             viewport = reference()
-            if viewport is None:
+            if viewport is None or viewport.session is None:
                 return None
             viewport.yield_to_render()
             if viewport.has_news():
-                redraw_viewports()
+                viewport.redraw()
             return viewport._interval
 
         bpy.app.timers.register(look, first_interval=_SHORTEST_INTERVAL)
 
+    def redraw(self) -> None:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D" and self._area in (None, area.as_pointer()):
+                    area.tag_redraw()
 
-def redraw_viewports() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+
+def viewport_of(area) -> Viewport | None:
+    """The viewport that an area shows, if it is one of ours."""
+    pointer = area.as_pointer()
+    return next((v for v in _open if v.session is not None and v.area == pointer), None)
+
+
+def live_line(progress) -> str:
+    """The statistics of a viewport: those of a render, and where the guide comes from."""
+    line = stats_line(progress.render)
+    if not progress.render.guiding.enabled:
+        return line
+    return f"{line} | {'Guide kept' if progress.guide_kept else 'Guide new'}"

@@ -29,5 +29,6 @@ void bind_node_enums(pybind11::module_& m);
 void bind_programs(pybind11::module_& m);
 void bind_scene(pybind11::module_& m);
 void bind_session(pybind11::module_& m);
+void bind_live(pybind11::module_& m);
 
 }  // namespace pharos

@@ -15,4 +15,5 @@ PYBIND11_MODULE(_native, m) {
     pharos::bind_programs(m);
     pharos::bind_scene(m);
     pharos::bind_session(m);
+    pharos::bind_live(m);
 }

@@ -69,6 +69,7 @@ struct MeshArrays {
     std::optional<Array<std::uint16_t>> material_indices;
     std::vector<NamedUv> uv_maps;
     std::vector<NamedValues> attributes;
+    std::uint64_t version = 0;
 };
 
 std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArrays& arrays) {
@@ -108,8 +109,18 @@ std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArra
                 "a uv map does not have 3 per triangle");
     }
     mesh.name = std::move(name);
+    mesh.version = arrays.version;
     scene.meshes.push_back(std::move(mesh));
     return index_of_last(scene.meshes.size());
+}
+
+// A mesh or image that the receiver of the description knows by its version.
+template <class Thing>
+std::uint32_t add_kept(std::vector<Thing>& things, std::string name, std::uint64_t version) {
+    Thing& kept = things.emplace_back();
+    kept.name = std::move(name);
+    kept.version = version;
+    return index_of_last(things.size());
 }
 
 struct InstanceArrays {
@@ -304,7 +315,8 @@ void bind_adders(py::class_<SceneDescription>& scene) {
                std::optional<Array<float>> normals,
                std::optional<Array<std::uint16_t>> materials,
                std::vector<NamedUv> uv_maps,
-               std::vector<NamedValues> attributes) {
+               std::vector<NamedValues> attributes,
+               std::uint64_t version) {
                 return add_mesh(s,
                                 std::move(name),
                                 {std::move(positions),
@@ -313,7 +325,8 @@ void bind_adders(py::class_<SceneDescription>& scene) {
                                  std::move(normals),
                                  std::move(materials),
                                  std::move(uv_maps),
-                                 std::move(attributes)});
+                                 std::move(attributes),
+                                 version});
             },
             FloatGuard(),
             py::arg("name"),
@@ -323,7 +336,16 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("normals") = py::none(),
             py::arg("material_indices") = py::none(),
             py::arg("uv_maps") = std::vector<NamedUv>(),
-            py::arg("attributes") = std::vector<NamedValues>())
+            py::arg("attributes") = std::vector<NamedValues>(),
+            py::arg("version") = 0)
+        .def(
+            "add_kept_mesh",
+            [](SceneDescription& s, std::string name, std::uint64_t version) {
+                return add_kept(s.meshes, std::move(name), version);
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("version"))
         .def(
             "add_instance_attribute",
             [](SceneDescription& s, std::string name, const Array<float>& values) {
@@ -381,9 +403,11 @@ void bind_adders(py::class_<SceneDescription>& scene) {
                py::bytes data,
                std::optional<Array<float>> pixels,
                ImageColorSpace color_space,
-               ImageAlpha alpha) {
+               ImageAlpha alpha,
+               std::uint64_t version) {
                 ImageDescription image;
                 image.name = std::move(name);
+                image.version = version;
                 image.color_space = color_space;
                 image.alpha = alpha;
                 return add_image(
@@ -395,7 +419,16 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("data") = py::bytes(),
             py::arg("pixels") = py::none(),
             py::arg("color_space") = ImageColorSpace::Srgb,
-            py::arg("alpha") = ImageAlpha::Straight)
+            py::arg("alpha") = ImageAlpha::Straight,
+            py::arg("version") = 0)
+        .def(
+            "add_kept_image",
+            [](SceneDescription& s, std::string name, std::uint64_t version) {
+                return add_kept(s.images, std::move(name), version);
+            },
+            FloatGuard(),
+            py::arg("name"),
+            py::arg("version"))
         .def(
             "add_light",
             [](SceneDescription& s, const py::kwargs& fields) {

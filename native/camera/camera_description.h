@@ -24,6 +24,8 @@ struct CameraDescription {
     float aperture_ratio = 1.0f;
     std::uint32_t aperture_blades = 0;
     float aperture_rotation = 0.0f;
+
+    bool operator==(const CameraDescription&) const = default;
 };
 
 }  // namespace pharos

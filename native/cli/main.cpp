@@ -43,6 +43,14 @@ constexpr const char* kUsage =
     "  --save FILE        write the weights\n"
     "  --height N         rows of each picture (default: 64)\n"
     "  --rays N           paths into each direction (default: 64)\n"
+    "       pharos-cli adapt FILE --move X,Y,Z [options]\n"
+    "  error of every frame after a lamp has moved: guide kept, from nothing, without\n"
+    "  --lamp NAME        default: the first\n"
+    "  --frames N         after the move (default: 24)\n"
+    "  --learned N        frames before it (default: 64)\n"
+    "  --reference N      samples of the reference (default: 256)\n"
+    "  --size W,H         of the picture (default: the file's)\n"
+    "  --seed, --threads, --nee as above\n"
     "exit codes: 0 done, 1 error, 2 wrong arguments, 3 missing image (--strict), 4 out of memory,\n"
     "5 not written, 130 interrupted, 143 terminated (both write OUT)\n";
 
@@ -51,8 +59,10 @@ struct Command {
     int (*run)(const std::vector<std::string>& arguments);
 };
 
-constexpr Command kCommands[] = {
-    {"render", pharos::cli::render}, {"merge", pharos::cli::merge}, {"field", pharos::cli::field}};
+constexpr Command kCommands[] = {{"render", pharos::cli::render},
+                                 {"merge", pharos::cli::merge},
+                                 {"field", pharos::cli::field},
+                                 {"adapt", pharos::cli::adapt}};
 
 }  // namespace
 

@@ -25,6 +25,10 @@ class SceneReport {
 
     void add(ReportEntry entry) { entries_.push_back(std::move(entry)); }
 
+    void add(const SceneReport& other) {
+        entries_.insert(entries_.end(), other.entries_.begin(), other.entries_.end());
+    }
+
     [[nodiscard]] const std::vector<ReportEntry>& entries() const { return entries_; }
 
   private:

@@ -18,6 +18,8 @@ struct FilmDescription {
     float filter_width = 1.5f;
     float exposure = 1.0f;
     bool transparent = false;
+
+    bool operator==(const FilmDescription&) const = default;
 };
 
 }  // namespace pharos

@@ -105,6 +105,8 @@ inline constexpr std::uint32_t kLightPasses =
 struct AovDescription {
     std::string name;
     bool color = true;
+
+    bool operator==(const AovDescription&) const = default;
 };
 
 [[nodiscard]] inline const char* aov_channels(const AovDescription& aov) {

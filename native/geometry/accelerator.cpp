@@ -1,16 +1,10 @@
 #include "geometry/accelerator.h"
 
 #include <array>
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
 #include <exception>
+#include <map>
 #include <memory>
-#include <mutex>
-#include <new>
 #include <stdexcept>
-#include <string>
-#include <thread>
 #include <utility>
 
 #include <embree3/rtcore.h>
@@ -18,7 +12,9 @@
 
 #include "core/check.h"
 #include "core/fp_state.h"
+#include "geometry/embree_build.h"
 #include "geometry/instance_surface.h"
+#include "geometry/mesh_trees.h"
 #include "geometry/occluder_cache.h"
 #include "geometry/speed_trial.h"
 
@@ -27,86 +23,7 @@ namespace pharos {
 namespace {
 
 constexpr std::uint32_t kCancelPollInterval = 1u << 16;  // vertices or triangles copied in between
-constexpr std::size_t kShortBuild = 100000;              // triangles or instances, tens of ms
 constexpr std::size_t kCacheTrial = 64;                  // rays
-constexpr std::chrono::milliseconds kPollInterval(5);
-constexpr std::chrono::milliseconds kPatience(100);  // with a build that has been told to stop
-
-struct DeviceRelease {
-    void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
-};
-
-struct SceneRelease {
-    void operator()(RTCSceneTy* scene) const { rtcReleaseScene(scene); }
-};
-
-struct GeometryRelease {
-    void operator()(RTCGeometryTy* geometry) const { rtcReleaseGeometry(geometry); }
-};
-
-using DevicePtr = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
-using ScenePtr = std::unique_ptr<RTCSceneTy, SceneRelease>;
-using GeometryPtr = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
-
-// What Embree's callbacks see while it builds, on any of its threads.
-struct Monitor {
-    std::atomic<bool> stop{false};
-    std::atomic<std::int64_t> bytes{0};
-};
-
-bool on_memory(void* user, ssize_t change, bool /*post*/) {
-    auto& monitor = *static_cast<Monitor*>(user);
-    monitor.bytes.fetch_add(change, std::memory_order_relaxed);
-    // A refused allocation ends a build early; releases are never refused.
-    return change <= 0 || !monitor.stop.load(std::memory_order_relaxed);
-}
-
-bool on_progress(void* user, double /*fraction*/) {
-    return !static_cast<const Monitor*>(user)->stop.load(std::memory_order_relaxed);
-}
-
-void throw_if_cancelled(const CancelFlag& cancel) {
-    if (cancel.cancelled()) {
-        throw Cancelled();
-    }
-}
-
-void throw_if_failed(RTCError error) {
-    switch (error) {
-        case RTC_ERROR_NONE:
-            return;
-        case RTC_ERROR_OUT_OF_MEMORY:
-            throw std::bad_alloc();
-        case RTC_ERROR_CANCELLED:
-            throw Cancelled();
-        default:
-            throw std::runtime_error("Embree error " + std::to_string(error));
-    }
-}
-
-// No threads= here: it would set the task scheduler's limit for the whole process, host included.
-DevicePtr make_device() {
-    DevicePtr device(rtcNewDevice(nullptr));
-    if (device == nullptr) {
-        throw std::runtime_error("Embree cannot be started");
-    }
-    if (rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION) / 10000 != 3 ||
-        rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) {
-        throw std::runtime_error("Embree 3 with ray masks is needed");
-    }
-    return device;
-}
-
-ScenePtr make_scene(RTCDevice device, Monitor& monitor) {
-    ScenePtr scene(rtcNewScene(device));
-    if (scene == nullptr) {
-        throw std::bad_alloc();
-    }
-    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
-    rtcSetSceneProgressMonitorFunction(scene.get(), on_progress, &monitor);
-    return scene;
-}
 
 // Copies a mesh into buffers of Embree's own, transformed unless `to_world` is null.
 GeometryPtr make_triangles(RTCDevice device,
@@ -224,11 +141,21 @@ void intersect_stream(RTCScene scene,
     }
 }
 
-// Buffers of a mesh that is traced in world space; null for an instanced one.
-struct WorldTriangles {
+// The buffers of a mesh as it is traced, and its matrix where that is in object space.
+struct TracedTriangles {
     const float* vertices = nullptr;
     const std::uint32_t* indices = nullptr;
+    const Mat4* to_world = nullptr;
 };
+
+TracedTriangles traced_triangles(RTCGeometry geometry, const Mat4* to_world) {
+    const auto data = [&](RTCBufferType type) {
+        return rtcGetGeometryBufferData(geometry, type, 0);
+    };
+    return {static_cast<const float*>(data(RTC_BUFFER_TYPE_VERTEX)),
+            static_cast<const std::uint32_t*>(data(RTC_BUFFER_TYPE_INDEX)),
+            to_world};
+}
 
 void occluded_plain(RTCScene scene, std::span<const Ray> rays, std::span<std::uint8_t> occluded) {
     RTCIntersectContext context;
@@ -244,113 +171,65 @@ void occluded_plain(RTCScene scene, std::span<const Ray> rays, std::span<std::ui
     }
 }
 
-// Everything a build makes. Shared with the thread that runs a long build.
-struct Structure {
-    Monitor monitor;  // outlives the device, whose end it still counts
-    DevicePtr device;
-    std::vector<ScenePtr> objects;  // of meshes used more than once, by mesh index
+// The structure of one mesh in object space.
+struct MeshTree {
+    std::shared_ptr<EmbreeDevice> device;
+    GeometryPtr triangles;
     ScenePtr scene;
 };
 
-struct Commit {
-    std::shared_ptr<Structure> structure;
-    RTCScene scene = nullptr;
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool done = false;
-    RTCError error = RTC_ERROR_NONE;
-
-    void run() {
-        const FloatStateGuard float_state;
-        rtcCommitScene(scene);
-        const std::lock_guard lock(mutex);
-        error = rtcGetDeviceError(structure->device.get());  // errors are kept by thread
-        done = true;
-        changed.notify_all();
-    }
-
-    // True when the build has ended within the time.
-    bool wait(std::chrono::milliseconds time) {
-        std::unique_lock lock(mutex);
-        return changed.wait_for(lock, time, [this] { return done; });
-    }
-};
-
-// Builds that were cancelled but still run: Embree asks its monitor only between stages, which take
-// up to seconds for ten million triangles. They are joined when they have ended or, at the latest,
-// when the process exits, because Embree must not be torn down under them.
-class AbandonedBuilds {
-  public:
-    static AbandonedBuilds& instance() {
-        static AbandonedBuilds builds;
-        return builds;
-    }
-
-    void keep(std::jthread thread, std::shared_ptr<Commit> commit) {
-        const std::lock_guard lock(mutex_);
-        std::erase_if(builds_, [](const Build& build) {
-            return build.commit->wait(std::chrono::milliseconds(0));
-        });
-        builds_.push_back({std::move(commit), std::move(thread)});
-    }
-
-  private:
-    struct Build {
-        std::shared_ptr<Commit> commit;
-        std::jthread thread;  // joined before commit goes
-    };
-
-    std::mutex mutex_;
-    std::vector<Build> builds_;
-};
-
-// A build too long to wait for its end runs on a thread of its own, and is left behind there when
-// it does not end soon after it was cancelled.
-void commit_scene(const std::shared_ptr<Structure>& structure,
-                  RTCScene scene,
-                  std::size_t triangles,
-                  const CancelFlag& cancel) {
-    throw_if_cancelled(cancel);
-    const auto commit = std::make_shared<Commit>();
-    commit->structure = structure;
-    commit->scene = scene;
-    if (triangles < kShortBuild) {
-        commit->run();
-    } else {
-        std::jthread thread([commit] { commit->run(); });
-        while (!commit->wait(kPollInterval)) {
-            if (!cancel.cancelled()) {
-                continue;
-            }
-            structure->monitor.stop.store(true, std::memory_order_relaxed);
-            if (!commit->wait(kPatience)) {
-                AbandonedBuilds::instance().keep(std::move(thread), commit);
-            }
-            throw Cancelled();
-        }
-    }
-    throw_if_cancelled(cancel);
-    throw_if_failed(commit->error);
+std::shared_ptr<const MeshTree> build_tree(const std::shared_ptr<EmbreeDevice>& device,
+                                           const Mesh& mesh,
+                                           const CancelFlag& cancel) {
+    const auto tree = std::make_shared<MeshTree>();
+    tree->device = device;
+    tree->scene = make_scene(*device);
+    tree->triangles = make_triangles(device->device.get(), mesh, nullptr, cancel);
+    rtcSetGeometryMask(tree->triangles.get(), 0xffffffffu);
+    rtcCommitGeometry(tree->triangles.get());
+    rtcAttachGeometryByID(tree->scene.get(), tree->triangles.get(), 0);
+    commit_scene({tree, device, tree->scene.get()}, mesh.triangles.size(), cancel);
+    return tree;
 }
 
+using Trees = std::vector<std::shared_ptr<const MeshTree>>;  // by mesh; null: not instanced
+
+// Everything a build makes. Shared with the thread that runs a long build.
+struct Structure {
+    std::shared_ptr<EmbreeDevice> device;
+    Trees trees;
+    ScenePtr scene;
+};
+
 }  // namespace
+
+struct MeshTrees::Impl {
+    std::shared_ptr<EmbreeDevice> device = std::make_shared<EmbreeDevice>();
+    std::map<std::uint64_t, std::shared_ptr<const MeshTree>> by_version;
+};
+
+MeshTrees::MeshTrees() : impl_(std::make_unique<Impl>()) {}
+
+MeshTrees::~MeshTrees() = default;
+
+std::size_t MeshTrees::size() const {
+    return impl_->by_version.size();
+}
 
 struct Accelerator::Impl {
     std::shared_ptr<Structure> structure = std::make_shared<Structure>();
     RTCScene scene = nullptr;  // the structure's
     Bounds3 bounds;
-    std::vector<WorldTriangles> world;  // by instance
-    SpeedTrial occluder_trial;          // with the cache of occluders or without
+    std::vector<TracedTriangles> traced;  // by instance
+    SpeedTrial occluder_trial;            // with the cache of occluders or without
 
     void build(std::span<const Mesh> meshes,
                std::span<const Instance> instances,
-               const CancelFlag& cancel);
+               const CancelFlag& cancel,
+               MeshTrees::Impl* kept);
     void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility) const;
     void occluded_cached(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
     void remember(const RTCHit& hit, OccluderCache& cache) const;
-    [[nodiscard]] RTCScene object_scene(const Mesh& mesh,
-                                        std::uint32_t index,
-                                        const CancelFlag& cancel) const;
 };
 
 // A cache of its own for each call: neighbouring pixels share their occluders. Where it stops less
@@ -387,34 +266,15 @@ void Accelerator::Impl::occluded_cached(std::span<const Ray> rays,
     }
 }
 
-// Only triangles in world space: those of instances would have to be transformed each time.
 void Accelerator::Impl::remember(const RTCHit& hit, OccluderCache& cache) const {
-    const WorldTriangles& mesh = world[hit.geomID];
-    if (hit.instID[0] != RTC_INVALID_GEOMETRY_ID || mesh.vertices == nullptr) {
-        return;
-    }
+    const bool instanced = hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+    const TracedTriangles& mesh = traced[instanced ? hit.instID[0] : hit.geomID];
     const auto corner = [&](std::size_t k) {
         const float* p = mesh.vertices + 3 * std::size_t{mesh.indices[3 * hit.primID + k]};
-        return Vec3(p[0], p[1], p[2]);
+        const Vec3 point(p[0], p[1], p[2]);
+        return mesh.to_world != nullptr ? transform_point(*mesh.to_world, point) : point;
     };
     cache.insert(corner(0), corner(1), corner(2));
-}
-
-// The scene of a shared mesh, built when it is first met.
-RTCScene Accelerator::Impl::object_scene(const Mesh& mesh,
-                                         std::uint32_t index,
-                                         const CancelFlag& cancel) const {
-    RTCDevice device = structure->device.get();
-    ScenePtr& object = structure->objects[index];
-    if (object == nullptr) {
-        object = make_scene(device, structure->monitor);
-        const GeometryPtr geometry = make_triangles(device, mesh, nullptr, cancel);
-        rtcSetGeometryMask(geometry.get(), 0xffffffffu);
-        rtcCommitGeometry(geometry.get());
-        rtcAttachGeometryByID(object.get(), geometry.get(), 0);
-        commit_scene(structure, object.get(), mesh.triangles.size(), cancel);
-    }
-    return object.get();
 }
 
 // The geometry's id in the scene is the index of its instance.
@@ -426,17 +286,48 @@ void Accelerator::Impl::attach(std::uint32_t index,
     rtcAttachGeometryByID(scene, geometry.get(), index);
 }
 
+// Trees of the meshes that are brought into the scene by matrices: those used more than once, or
+// all of them where they are kept.
+Trees make_trees(const std::shared_ptr<EmbreeDevice>& device,
+                 std::span<const Mesh> meshes,
+                 std::span<const std::uint32_t> uses,
+                 MeshTrees::Impl* kept,
+                 const CancelFlag& cancel) {
+    Trees trees(meshes.size());
+    std::map<std::uint64_t, std::shared_ptr<const MeshTree>> used;
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        const Mesh& mesh = meshes[i];
+        if (uses[i] < (kept != nullptr ? 1u : 2u) || mesh.triangles.empty() ||
+            mesh.positions.empty()) {
+            continue;
+        }
+        const auto known = kept != nullptr ? kept->by_version.find(mesh.version) : used.end();
+        if (kept != nullptr && known != kept->by_version.end()) {
+            trees[i] = known->second;
+        } else {
+            trees[i] = build_tree(device, mesh, cancel);
+        }
+        if (mesh.version != 0) {
+            used.emplace(mesh.version, trees[i]);
+        }
+    }
+    if (kept != nullptr) {
+        kept->by_version = std::move(used);
+    }
+    return trees;
+}
+
 void Accelerator::Impl::build(std::span<const Mesh> meshes,
                               std::span<const Instance> instances,
-                              const CancelFlag& cancel) {
-    structure->device = make_device();
-    RTCDevice device = structure->device.get();
-    rtcSetDeviceMemoryMonitorFunction(device, on_memory, &structure->monitor);
-    structure->objects.resize(meshes.size());
-    world.resize(instances.size());
-    structure->scene = make_scene(device, structure->monitor);
-    scene = structure->scene.get();
+                              const CancelFlag& cancel,
+                              MeshTrees::Impl* kept) {
+    structure->device = kept != nullptr ? kept->device : std::make_shared<EmbreeDevice>();
+    RTCDevice device = structure->device->device.get();
     const std::vector<std::uint32_t> uses = count_mesh_uses(meshes.size(), instances);
+    structure->trees = make_trees(structure->device, meshes, uses, kept, cancel);
+    traced.resize(instances.size());
+    structure->scene = make_scene(*structure->device);
+    scene = structure->scene.get();
     std::size_t primitives = 0;
     for (std::uint32_t i = 0; i < instances.size(); ++i) {
         const Instance& instance = instances[i];
@@ -445,23 +336,20 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
         if (mesh.triangles.empty() || mesh.positions.empty()) {
             continue;
         }
-        if (uses[instance.mesh] == 1) {
+        if (const auto& tree = structure->trees[instance.mesh]) {
+            const GeometryPtr placed = make_instance(device, tree->scene.get(), instance.to_world);
+            attach(i, placed, instance.visibility);
+            traced[i] = traced_triangles(tree->triangles.get(), &instance.to_world);
+            ++primitives;
+        } else {
             const GeometryPtr triangles = make_triangles(device, mesh, &instance.to_world, cancel);
-            const auto data = [&](RTCBufferType type) {
-                return rtcGetGeometryBufferData(triangles.get(), type, 0);
-            };
-            world[i] = {static_cast<const float*>(data(RTC_BUFFER_TYPE_VERTEX)),
-                        static_cast<const std::uint32_t*>(data(RTC_BUFFER_TYPE_INDEX))};
+            traced[i] = traced_triangles(triangles.get(), nullptr);
             attach(i, triangles, instance.visibility);
             primitives += mesh.triangles.size();
-        } else {
-            RTCScene object = object_scene(mesh, instance.mesh, cancel);
-            attach(i, make_instance(device, object, instance.to_world), instance.visibility);
-            ++primitives;
         }
     }
     throw_if_failed(rtcGetDeviceError(device));
-    commit_scene(structure, scene, primitives, cancel);
+    commit_scene({structure, structure->device, scene}, primitives, cancel);
 
     RTCBounds b;
     rtcGetSceneBounds(scene, &b);
@@ -471,7 +359,8 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
 
 Accelerator::Accelerator(std::span<const Mesh> meshes,
                          std::span<const Instance> instances,
-                         const CancelFlag& cancel)
+                         const CancelFlag& cancel,
+                         MeshTrees* kept)
     : impl_(std::make_unique<Impl>()) {
     for (const Instance& instance : instances) {
         if (instance.mesh >= meshes.size()) {
@@ -479,7 +368,7 @@ Accelerator::Accelerator(std::span<const Mesh> meshes,
         }
     }
     const FloatStateGuard float_state;
-    impl_->build(meshes, instances, cancel);
+    impl_->build(meshes, instances, cancel, kept != nullptr ? &kept->impl() : nullptr);
 }
 
 Accelerator::~Accelerator() = default;
@@ -525,7 +414,7 @@ Bounds3 Accelerator::bounds() const {
 }
 
 std::uint64_t Accelerator::bytes() const {
-    const std::int64_t bytes = impl_->structure->monitor.bytes.load(std::memory_order_relaxed);
+    const std::int64_t bytes = impl_->structure->device->bytes.load(std::memory_order_relaxed);
     return bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
 }
 

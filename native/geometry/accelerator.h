@@ -1,6 +1,7 @@
-// Ray tracing over instances of triangle meshes; the only user of Embree (accelerator.cpp).
+// Ray tracing over instances of triangle meshes; Embree stays behind it (accelerator.cpp).
 //
 // Meshes used once are traced in world space; a mesh used more often is stored once and instanced.
+// For a scene that is edited all are instanced, and their structures are kept (mesh_trees.h).
 // Robust traversal. Rays with non-finite members miss. Building polls `cancel` and throws
 // Cancelled; out of memory throws std::bad_alloc.
 #pragma once
@@ -38,12 +39,15 @@ struct Hit {
 
 enum class RayOrder : std::uint8_t { Incoherent, Coherent };
 
+class MeshTrees;
+
 class Accelerator {
   public:
     // The meshes and instances must outlive the accelerator and stay where they are.
     Accelerator(std::span<const Mesh> meshes,
                 std::span<const Instance> instances,
-                const CancelFlag& cancel);
+                const CancelFlag& cancel,
+                MeshTrees* kept = nullptr);
     ~Accelerator();
     Accelerator(const Accelerator&) = delete;
     Accelerator& operator=(const Accelerator&) = delete;

@@ -40,7 +40,8 @@ std::vector<std::uint32_t> count_mesh_uses(std::size_t mesh_count,
 }
 
 std::vector<InstanceSurface> make_instance_surfaces(std::span<const Mesh> meshes,
-                                                    std::span<const Instance> instances) {
+                                                    std::span<const Instance> instances,
+                                                    bool all_shared) {
     const std::vector<std::uint32_t> uses = count_mesh_uses(meshes.size(), instances);
     std::vector<InstanceSurface> surfaces;
     surfaces.reserve(instances.size());
@@ -57,7 +58,7 @@ std::vector<InstanceSurface> make_instance_surfaces(std::span<const Mesh> meshes
         s.winding = instance.mirrored ? -1.0f : 1.0f;
         s.to_world = instance.to_world;
         s.normal_to_world = Mat4(glm::transpose(Mat3(instance.to_object)));
-        s.error_bound = error_bound(instance, uses[instance.mesh] > 1);
+        s.error_bound = error_bound(instance, all_shared || uses[instance.mesh] > 1);
         surfaces.push_back(s);
     }
     return surfaces;

@@ -38,9 +38,9 @@ struct InstanceSurface {
     Mat4 error_bound{1.0f};
 };
 
-// One per instance, in order.
+// One per instance, in order; `all_shared`: as an accelerator traces them that keeps its meshes.
 [[nodiscard]] std::vector<InstanceSurface> make_instance_surfaces(
-    std::span<const Mesh> meshes, std::span<const Instance> instances);
+    std::span<const Mesh> meshes, std::span<const Instance> instances, bool all_shared = false);
 
 // How often each mesh is used: one used once is traced in world space.
 [[nodiscard]] std::vector<std::uint32_t> count_mesh_uses(std::size_t mesh_count,

@@ -31,10 +31,13 @@ struct MeshAttribute {
 struct InstanceAttribute {
     std::string name;
     std::vector<Vec4> values;  // colour or vector, alpha
+
+    bool operator==(const InstanceAttribute&) const = default;
 };
 
 struct Mesh {
     std::string name;
+    std::uint64_t version = 0;  // equal and not 0: the same content (scene/live_scene.h)
     std::vector<Vec3> positions;
     std::vector<UVec3> triangles;  // indices into positions
     NormalDomain normal_domain = NormalDomain::Face;

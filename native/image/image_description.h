@@ -13,6 +13,7 @@ enum class ImageAlpha : std::uint32_t { Straight, Premultiplied, ChannelPacked, 
 // Exactly one of path, bytes (an encoded file) and pixels is used; none of them: a missing image.
 struct ImageDescription {
     std::string name;
+    std::uint64_t version = 0;  // equal and not 0: the same content (scene/live_scene.h)
     std::string path;
     std::vector<std::uint8_t> bytes;
     std::vector<float> pixels;  // RGBA, bottom row first

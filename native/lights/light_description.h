@@ -32,6 +32,8 @@ struct LightDescription {
     bool use_mis = true;
     std::uint32_t visibility = kVisibleAll;
     std::uint32_t max_bounces = 1024;
+
+    bool operator==(const LightDescription&) const = default;
 };
 
 }  // namespace pharos

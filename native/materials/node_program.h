@@ -308,6 +308,8 @@ struct NodeOp {
     // Operations that say where the hit is may look this many pixels' footprints beside it, along
     // two axes in the surface: bump mapping compares heights.
     Vec2 step{0.0f};
+
+    bool operator==(const NodeOp&) const = default;
 };
 
 enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectangular, MirrorBall };
@@ -316,6 +318,8 @@ enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectan
 struct ImageTile {
     std::uint32_t number = 0;
     std::uint32_t image = 0xffffffffu;
+
+    bool operator==(const ImageTile&) const = default;
 };
 
 struct ImageUse {
@@ -324,7 +328,9 @@ struct ImageUse {
     ImageExtension extension = ImageExtension::Repeat;
     ImageProjection projection = ImageProjection::Flat;
     float projection_blend = 0.0f;
-    std::vector<ImageTile> tiles;  // of a tiled image; elsewhere there is nothing
+    std::vector<ImageTile> tiles{};  // of a tiled image; elsewhere there is nothing
+
+    bool operator==(const ImageUse&) const = default;
 };
 
 struct NodeProgram {
@@ -335,6 +341,8 @@ struct NodeProgram {
     std::vector<std::string> names;          // UV maps and attributes referred to by ops
     std::vector<std::vector<float>> tables;  // RGBA rows
     std::uint32_t register_count = 0;
+
+    bool operator==(const NodeProgram&) const = default;
 };
 
 // Operand order of the two Principled versions after weight:3 (name:size in one place for both

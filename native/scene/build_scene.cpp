@@ -1,20 +1,21 @@
 #include <algorithm>
 #include <utility>
 
-#include "camera/camera.h"
 #include "core/fp_state.h"
 #include "core/parallel.h"
 #include "film/passes.h"
 #include "image/image_io.h"
 #include "scene/mend.h"
 #include "scene/scene.h"
+#include "scene/scene_build.h"
+#include "scene/scene_lights.h"
+#include "scene/scene_pieces.h"
+#include "scene/view.h"
 #include "scene/world.h"
 
 namespace pharos {
 
 namespace {
-
-constexpr std::size_t kCancelPollInterval = 1u << 16;
 
 // Grey diffuse, for faces without a material.
 NodeProgram default_program() {
@@ -30,12 +31,17 @@ NodeProgram default_program() {
 
 class SceneBuild {
   public:
-    SceneBuild(SceneDescription description, const CancelFlag& cancel, SceneReport& report)
-        : scene_(std::make_unique<Scene>()), cancel_(cancel), report_(report) {
+    SceneBuild(SceneDescription description,
+               const CancelFlag& cancel,
+               SceneReport& report,
+               ScenePieces* pieces)
+        : scene_(std::make_unique<Scene>()), cancel_(cancel), report_(report), pieces_(pieces) {
         scene_->description = std::move(description);
     }
 
-    [[nodiscard]] std::unique_ptr<const Scene> run() {
+    [[nodiscard]] std::unique_ptr<Scene> run() {
+        auto key = pieces_ != nullptr ? world_key(scene_->description) : std::nullopt;
+        mend_meshes();
         mend();
         poll();
         load_textures();
@@ -44,16 +50,22 @@ class SceneBuild {
         make_shading_context();
         poll();
         scene_->accelerator =
-            std::make_unique<Accelerator>(scene_->description.meshes, scene_->instances, cancel_);
+            std::make_unique<Accelerator>(scene_->description.meshes,
+                                          scene_->instances,
+                                          cancel_,
+                                          pieces_ != nullptr ? &pieces_->trees() : nullptr);
         scene_->bounds = scene_->accelerator->bounds();
         if (scene_->bounds.empty()) {
             scene_->bounds.extend(Vec3(-1.0f));
             scene_->bounds.extend(Vec3(1.0f));
         }
         poll();
-        prepare_world(*scene_, pool_, cancel_);
+        prepare_world(*scene_,
+                      pool_,
+                      cancel_,
+                      pieces_ != nullptr ? pieces_->give_environment(std::move(key)) : nullptr);
         poll();
-        make_lights();
+        prepare_lights(*scene_, cancel_);
         poll();
         find_needs();
         return std::move(scene_);
@@ -66,25 +78,43 @@ class SceneBuild {
         }
     }
 
+    void mend_meshes();
     void mend();
+    [[nodiscard]] std::vector<bool> images_to_load();
     void load_textures();
     void compile_materials();
     void make_shading_context();
-    void make_lights();
     void find_needs();
-    void collect_emitters(std::uint32_t instance, std::vector<EmissiveTriangle>& emitters) const;
 
     std::unique_ptr<Scene> scene_;
     const CancelFlag& cancel_;
     SceneReport& report_;
+    ScenePieces* pieces_;
     ThreadPool pool_;
 };
 
+void SceneBuild::mend_meshes() {
+    std::vector<Mesh>& meshes = scene_->description.meshes;
+    scene_->mesh_bounds.resize(meshes.size());
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        poll();
+        if (pieces_ != nullptr && pieces_->give_mesh(*scene_, i, report_)) {
+            continue;
+        }
+        SceneReport own;
+        mend_mesh(meshes[i], cancel_, own);
+        report_.add(own);
+        if (pieces_ != nullptr) {
+            pieces_->remember_mesh(meshes[i], own);
+        }
+        for (const Vec3& p : meshes[i].positions) {
+            scene_->mesh_bounds[i].extend(p);
+        }
+    }
+}
+
 void SceneBuild::mend() {
     SceneDescription& d = scene_->description;
-    for (Mesh& mesh : d.meshes) {
-        mend_mesh(mesh, cancel_, report_);
-    }
     const auto default_material = static_cast<std::uint32_t>(d.materials.size());
     const bool wants_index = (d.passes.wanted & pass_bit(FilmPass::ObjectIndex)) != 0;
     for (std::size_t i = 0; i < d.instances.size(); ++i) {
@@ -103,22 +133,19 @@ void SceneBuild::mend() {
             }
         }
     }
-    scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances);
+    scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances, pieces_ != nullptr);
     mend_lamps(d.lights, report_);
-    if (d.has_camera && !is_usable(d.camera)) {
-        report_.add(Severity::Error, "Camera", "The camera's matrix or window is no number.");
-        d.has_camera = false;
-    }
+    mend_camera(d, report_);
 }
 
 // Only images that some program reads take time and memory.
-void SceneBuild::load_textures() {
+std::vector<bool> SceneBuild::images_to_load() {
     SceneDescription& d = scene_->description;
-    std::vector<bool> used(d.images.size());
+    std::vector<bool> wanted(d.images.size());
     const auto mark = [&](const NodeProgram& program) {
         for (const ImageUse& use : program.images) {
-            if (use.image < used.size()) {
-                used[use.image] = true;
+            if (use.image < wanted.size()) {
+                wanted[use.image] = true;
             }
         }
     };
@@ -126,19 +153,34 @@ void SceneBuild::load_textures() {
         mark(material.program);
     }
     mark(d.world.program);
+    for (std::size_t i = 0; i < d.images.size(); ++i) {
+        const bool known = pieces_ != nullptr && pieces_->give_image(*scene_, i, report_);
+        wanted[i] = wanted[i] && !known;
+    }
+    return wanted;
+}
+
+void SceneBuild::load_textures() {
+    SceneDescription& d = scene_->description;
     scene_->textures.resize(d.images.size());
+    const std::vector<bool> wanted = images_to_load();
     std::vector<SceneReport> reports(d.images.size());
     pool_.parallel_for(d.images.size(), [&](std::size_t i, unsigned /*worker*/) {
         poll();
-        if (used[i]) {
-            scene_->textures[i] = load_texture(d.images[i], reports[i], &cancel_);
+        ImageDescription& image = d.images[i];
+        if (wanted[i]) {
+            scene_->textures[i] = load_texture(image, reports[i], &cancel_);
         }
-        d.images[i].pixels = {};
-        d.images[i].bytes = {};
+        // What may be asked for by a later scene keeps its content until it is loaded.
+        if (pieces_ == nullptr || image.version == 0 || !scene_->textures[i].missing()) {
+            image.pixels = {};
+            image.bytes = {};
+        }
     });
-    for (const SceneReport& report : reports) {
-        for (const ReportEntry& entry : report.entries()) {
-            report_.add(entry);
+    for (std::size_t i = 0; i < reports.size(); ++i) {
+        report_.add(reports[i]);
+        if (pieces_ != nullptr && wanted[i]) {
+            pieces_->remember_image(d.images[i], reports[i]);
         }
     }
 }
@@ -158,14 +200,6 @@ void SceneBuild::compile_materials() {
 
 void SceneBuild::make_shading_context() {
     const SceneDescription& d = scene_->description;
-    for (const Mesh& mesh : d.meshes) {
-        poll();
-        Bounds3 bounds;
-        for (const Vec3& p : mesh.positions) {
-            bounds.extend(p);
-        }
-        scene_->mesh_bounds.push_back(bounds);
-    }
     ShadingContext& context = scene_->shading;
     context.meshes = d.meshes;
     context.instances = scene_->instances;
@@ -173,79 +207,7 @@ void SceneBuild::make_shading_context() {
     context.mesh_bounds = scene_->mesh_bounds;
     context.instance_attributes = d.instance_attributes;
     context.blender_version = d.blender_version;
-    if (!d.has_camera) {
-        return;
-    }
-    context.world_to_camera = Camera(d.camera, d.film.width, d.film.height).world_to_camera();
-    context.perspective = d.camera.type == CameraType::Perspective;
-    context.pixel =
-        (d.camera.window_upper - d.camera.window_lower) /
-        glm::max(Vec2(static_cast<float>(d.film.width), static_cast<float>(d.film.height)),
-                 Vec2(1.0f));
-    // The window (distance 1 of a perspective camera) onto [0, 1] x [0, 1].
-    const Vec2 lower = d.camera.window_lower;
-    const Vec2 scale = 1.0f / (d.camera.window_upper - lower);
-    Mat4 m(1.0f);
-    m[0][0] = scale.x;
-    m[1][1] = scale.y;
-    const int shift = d.camera.type == CameraType::Perspective ? 2 : 3;
-    const float sign = d.camera.type == CameraType::Perspective ? 1.0f : -1.0f;
-    m[shift][0] = sign * lower.x * scale.x;
-    m[shift][1] = sign * lower.y * scale.y;
-    if (d.camera.type == CameraType::Perspective) {
-        m[2][3] = -1.0f;  // w = depth
-        m[3][3] = 0.0f;
-    }
-    context.camera_to_window = m;
-}
-
-// The triangles of one instance that next-event estimation aims at.
-void SceneBuild::collect_emitters(std::uint32_t instance,
-                                  std::vector<EmissiveTriangle>& emitters) const {
-    const Instance& object = scene_->instances[instance];
-    const Mesh& mesh = scene_->description.meshes[object.mesh];
-    const auto is_sampled = [&](std::uint32_t index) {
-        const Material& material = scene_->materials[index];
-        return material.emits && material.emission_sampling;
-    };
-    if (std::ranges::none_of(object.materials, is_sampled)) {
-        return;
-    }
-    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-        if (i % kCancelPollInterval == 0) {
-            poll();
-        }
-        const std::size_t slot = mesh.material_indices.empty() ? 0 : mesh.material_indices[i];
-        const std::uint32_t material =
-            object.materials[std::min(slot, object.materials.size() - 1)];
-        if (!is_sampled(material)) {
-            continue;
-        }
-        const UVec3& t = mesh.triangles[i];
-        const Mat3 linear(object.to_world);
-        const Vec3 e1 = linear * (mesh.positions[t.y] - mesh.positions[t.x]);
-        const Vec3 e2 = linear * (mesh.positions[t.z] - mesh.positions[t.x]);
-        const float doubled_area = glm::length(glm::cross(e1, e2));
-        if (doubled_area > 0.0f && doubled_area < kInfinity) {
-            emitters.push_back({instance, i, scene_->materials[material].emission_estimate});
-        }
-    }
-}
-
-void SceneBuild::make_lights() {
-    std::vector<EmissiveTriangle> emitters;
-    for (std::uint32_t i = 0; i < scene_->instances.size(); ++i) {
-        collect_emitters(i, emitters);
-    }
-    scene_->needs.emissive_triangles = !emitters.empty();
-    LightSamplerInput input;
-    input.lamps = scene_->description.lights;
-    input.blender_version = scene_->description.blender_version;
-    input.triangles = emitters;
-    input.meshes = scene_->description.meshes;
-    input.instances = scene_->instances;
-    input.environment = scene_->environment.get();
-    scene_->lights = std::make_unique<LightSampler>(input);
+    prepare_view(*scene_);
 }
 
 void SceneBuild::find_needs() {
@@ -256,8 +218,6 @@ void SceneBuild::find_needs() {
         }
     }
     SceneNeeds& needs = scene_->needs;
-    needs.lamps_hittable = scene_->lights->has_hittable_lamps();
-    needs.nee = !scene_->lights->empty();
     needs.textures = needs.environment && scene_->world.textured;
     needs.light_path = needs.environment && scene_->world.asks_path;
     needs.all_constant = true;
@@ -275,14 +235,21 @@ void SceneBuild::find_needs() {
 
 }  // namespace
 
-std::unique_ptr<const Scene> build_scene(SceneDescription description,
-                                         const CancelFlag& cancel,
-                                         SceneReport& report) {
+std::unique_ptr<Scene> build_scene(SceneDescription description,
+                                   const CancelFlag& cancel,
+                                   SceneReport& report,
+                                   ScenePieces* pieces) {
     const FloatStateGuard float_state;
     if (cancel.cancelled()) {
         throw Cancelled();
     }
-    return SceneBuild(std::move(description), cancel, report).run();
+    return SceneBuild(std::move(description), cancel, report, pieces).run();
+}
+
+std::unique_ptr<const Scene> build_scene(SceneDescription description,
+                                         const CancelFlag& cancel,
+                                         SceneReport& report) {
+    return build_scene(std::move(description), cancel, report, nullptr);
 }
 
 }  // namespace pharos

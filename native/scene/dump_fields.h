@@ -82,6 +82,7 @@ void fields(Archive& archive, DumpValue<Archive, InstanceAttribute>& value) {
 template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, Mesh>& value) {
     auto& [name,
+           version,
            positions,
            triangles,
            normal_domain,
@@ -90,6 +91,7 @@ void fields(Archive& archive, DumpValue<Archive, Mesh>& value) {
            uv_maps,
            attributes] = value;
     archive(name, positions, triangles, normal_domain, normals, material_indices, uv_maps);
+    static_cast<void>(version);  // of a running program only
     if (archive.version() >= 3) {
         archive(attributes);
     }
@@ -140,9 +142,10 @@ void fields(Archive& archive, DumpValue<Archive, InstanceDescription>& value) {
 template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, ImageDescription>& value) {
     ImageDescription copy;
-    auto& [name, path, bytes, pixels, width, height, color_space, alpha] =
+    auto& [name, version, path, bytes, pixels, width, height, color_space, alpha] =
         Archive::self_contained(value, copy);
     archive(name, path, bytes, pixels, width, height, color_space, alpha);
+    static_cast<void>(version);  // of a running program only
 }
 
 template <class Archive>

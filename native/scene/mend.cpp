@@ -189,6 +189,21 @@ bool is_finite(const LightDescription& lamp) {
            std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
 }
 
+bool is_usable(const CameraDescription& camera) {
+    const std::array values = {camera.window_lower.x,
+                               camera.window_lower.y,
+                               camera.window_upper.x,
+                               camera.window_upper.y,
+                               camera.near_clip,
+                               camera.far_clip,
+                               camera.lens_radius,
+                               camera.focus_distance,
+                               camera.aperture_ratio,
+                               camera.aperture_rotation};
+    return is_finite(camera.to_world) &&
+           std::ranges::none_of(values, [](float value) { return std::isnan(value); });
+}
+
 }  // namespace
 
 void mend_mesh(Mesh& mesh, const CancelFlag& cancel, SceneReport& report) {
@@ -280,19 +295,11 @@ void mend_lamps(std::vector<LightDescription>& lamps, SceneReport& report) {
     });
 }
 
-bool is_usable(const CameraDescription& camera) {
-    const std::array values = {camera.window_lower.x,
-                               camera.window_lower.y,
-                               camera.window_upper.x,
-                               camera.window_upper.y,
-                               camera.near_clip,
-                               camera.far_clip,
-                               camera.lens_radius,
-                               camera.focus_distance,
-                               camera.aperture_ratio,
-                               camera.aperture_rotation};
-    return is_finite(camera.to_world) &&
-           std::ranges::none_of(values, [](float value) { return std::isnan(value); });
+void mend_camera(SceneDescription& description, SceneReport& report) {
+    if (description.has_camera && !is_usable(description.camera)) {
+        report.add(Severity::Error, "Camera", "The camera's matrix or window is no number.");
+        description.has_camera = false;
+    }
 }
 
 }  // namespace pharos

@@ -31,7 +31,7 @@ inline constexpr float kMaxCoordinate = 1e15f;  // metres; squares of lengths st
 // Takes out lamps with a value that is no number.
 void mend_lamps(std::vector<LightDescription>& lamps, SceneReport& report);
 
-// False for a camera whose matrix or window is no number.
-[[nodiscard]] bool is_usable(const CameraDescription& camera);
+// Takes out a camera whose matrix or window is no number.
+void mend_camera(SceneDescription& description, SceneReport& report);
 
 }  // namespace pharos

@@ -28,12 +28,16 @@ struct InstanceDescription {
     std::uint32_t material_set = 0;  // into material_sets
     Mat4 to_world{1.0f};
     std::uint32_t visibility = kVisibleAll;
+
+    bool operator==(const InstanceDescription&) const = default;
 };
 
 struct MaterialDescription {
     std::string name;
     NodeProgram program;
     bool emission_sampling = true;  // next-event estimation towards emissive triangles
+
+    bool operator==(const MaterialDescription&) const = default;
 };
 
 struct WorldDescription {
@@ -41,6 +45,8 @@ struct WorldDescription {
     std::uint32_t map_resolution = 0;  // width of the importance map; 0: from the images, else 1024
     bool use_mis = true;
     std::uint32_t visibility = kVisibleAll;
+
+    bool operator==(const WorldDescription&) const = default;
 };
 
 enum class GuidingMode : std::uint32_t {
@@ -64,6 +70,8 @@ struct RenderSettings {
     std::uint32_t transparent_bounces = 8;
     bool caustics_reflective = true;
     bool caustics_refractive = true;
+
+    bool operator==(const RenderSettings&) const = default;
 };
 
 // What the passes on request need beside the scene (film/passes.h).
@@ -75,6 +83,8 @@ struct PassesDescription {
     std::vector<std::uint32_t> object_indices;    // of each instance; 0 beyond the end
     std::vector<std::uint32_t> material_indices;  // of each material; likewise
     std::vector<AovDescription> aovs;
+
+    bool operator==(const PassesDescription&) const = default;
 };
 
 struct SceneDescription {

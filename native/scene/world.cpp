@@ -1,6 +1,7 @@
 #include "scene/world.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace pharos {
 
@@ -80,7 +81,10 @@ bool is_black(const Rgb& radiance) {
 
 }  // namespace
 
-void prepare_world(Scene& scene, ThreadPool& pool, const CancelFlag& cancel) {
+void prepare_world(Scene& scene,
+                   ThreadPool& pool,
+                   const CancelFlag& cancel,
+                   std::unique_ptr<EnvironmentLight> kept) {
     const WorldDescription& world = scene.description.world;
     SceneNeeds& needs = scene.needs;
     needs.environment = !scene.world.program.ops.empty() && world.visibility != 0;
@@ -104,6 +108,9 @@ void prepare_world(Scene& scene, ThreadPool& pool, const CancelFlag& cancel) {
         needs.constant_environment = true;
         needs.environment = !is_black(scene.constant_world);
         radiance.assign(1, scene.constant_world);
+    } else if (sampled && kept != nullptr) {
+        scene.environment = std::move(kept);
+        return;
     } else if (sampled) {
         size = map_size(scene);
         radiance = evaluate_map(scene, size, pool, cancel);

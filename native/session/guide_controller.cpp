@@ -75,6 +75,32 @@ GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std
     }
 }
 
+void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited) {
+    if (!enabled_) {
+        return;
+    }
+    pixels_ = pixels;
+    pixel_estimate_.clear();
+    weights_ = PassWeights();
+    continued_ = field_->generation() > 0;
+    if (!edited && pass_ > 1) {
+        return;
+    }
+    field_->restart_optimizer();
+    if (selection_) {
+        selection_.emplace(scene_box);
+    }
+    pass_ = 0;
+    hard_share_ = 0.0f;
+    adjoint_scale_ = {};
+    status_.closed = false;
+    status_.guided_share = 0.0;
+}
+
+std::array<double, 2> GuideController::weight(std::uint32_t first_sample) const {
+    return continued_ ? std::array{1.0, 1.0} : weights_.of(first_sample);
+}
+
 std::uint32_t GuideController::most_samples(std::uint32_t done) const {
     if (!learning()) {
         return std::numeric_limits<std::uint32_t>::max();

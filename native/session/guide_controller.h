@@ -27,6 +27,11 @@ class GuideController {
   public:
     GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels);
 
+    // Goes on with another picture: the field lives on. Another view of the same scene is guided
+    // from its first pass on; in an edited one the field's optimiser starts again, and what was
+    // proven has to be proven anew.
+    void begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited);
+
     [[nodiscard]] bool learning() const { return enabled_ && !frozen_ && !status_.closed; }
 
     // Samples that the next pass should take at most, after `done` of them: few while much is
@@ -36,7 +41,14 @@ class GuideController {
     // Looks at the picture after `done` samples, before it learns from the last of them.
     void see(const Film& film, std::uint32_t done);
 
-    [[nodiscard]] const PassWeights& weights() const { return weights_; }
+    // Equal ones once the guide goes on from an earlier picture: what passes 0 and 1 show there is
+    // not independent of what guided them.
+    [[nodiscard]] std::array<double, 2> weight(std::uint32_t first_sample) const;
+
+    // What it has learned, used or not; null: nothing yet.
+    [[nodiscard]] const GuidingField* learned() const {
+        return field_ && field_->generation() > 0 ? &*field_ : nullptr;
+    }
 
     // What the next pass may use. Valid until learn() is called.
     [[nodiscard]] GuidingContext next_pass() const;
@@ -70,6 +82,7 @@ class GuideController {
     bool frozen_ = false;
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
+    bool continued_ = false;  // from an earlier picture
     bool hard_ = false;
     float hard_share_ = 0.0f;  // of the guide, at least, everywhere
     std::array<float, 2> adjoint_scale_{};

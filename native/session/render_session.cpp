@@ -98,10 +98,11 @@ struct RenderSession::Work {
     ThreadPool& pool;
     Integrator& integrator;
     SharedFilm& film;
-    GuideController guide;
+    GuideController& guide;
     RenderPosition position;
     std::uint64_t nonfinite_before = 0;  // in the checkpoint it went on from
     double cpu_begin = process_cpu_seconds();
+    std::function<void(const GuideController&)> after_pass = {};
 };
 
 struct RenderSession::Impl {
@@ -129,7 +130,8 @@ struct RenderSession::Impl {
     std::jthread driver;
 
     void run(SceneDescription description);
-    void render(const Scene& scene, const RenderIdentity& identity);
+    void run_built(const BuiltScene& built);
+    void render(const Scene& scene, const RenderIdentity& identity, const BuiltScene* built);
     [[nodiscard]] GuideController make_guide(const Scene& scene) const;
     void resume(const Scene& scene, const CheckpointKeeper& keeper, Work& work);
     void begin(const Scene& scene, const Work& work);
@@ -206,10 +208,27 @@ void RenderSession::Impl::run(SceneDescription description) {
             report = build_report;
             statistics.build_seconds = seconds_since(begin);
         }
-        render(*scene, identity);
+        render(*scene, identity, nullptr);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const Cancelled&) {
         end(SessionState::Cancelled, {});
+    } catch (const std::bad_alloc&) {
+        end(SessionState::Failed, kOutOfMemory);
+    } catch (const std::exception& error) {
+        end(SessionState::Failed, error.what());
+    }
+}
+
+void RenderSession::Impl::run_built(const BuiltScene& built) {
+    const FloatStateGuard float_state;
+    try {
+        const SceneDescription& description = built.scene.description;
+        if (const std::string problem = fatal_problem(description, options); !problem.empty()) {
+            end(SessionState::Failed, problem);
+            return;
+        }
+        render(built.scene, RenderIdentity{}, &built);
+        end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const std::bad_alloc&) {
         end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
@@ -257,14 +276,21 @@ void RenderSession::Impl::begin(const Scene& scene, const Work& work) {
     progress.memory_bytes = scene.bytes() + pixels * (200 + sizeof(double) * passes.size());
 }
 
-void RenderSession::Impl::render(const Scene& scene, const RenderIdentity& identity) {
+void RenderSession::Impl::render(const Scene& scene,
+                                 const RenderIdentity& identity,
+                                 const BuiltScene* built) {
     const RenderSettings& settings = scene.description.settings;
     ThreadPool pool(options.threads);
     Integrator integrator(scene, pool);
     const auto shared_film = std::make_shared<SharedFilm>(
         scene.description.film,
         PassLayout(scene.description.passes.wanted, scene.description.passes.aovs));
-    Work work{pool, integrator, *shared_film, make_guide(scene), {}};
+    std::optional<GuideController> own_guide;
+    GuideController& guide = built != nullptr ? built->guide : own_guide.emplace(make_guide(scene));
+    Work work{pool, integrator, *shared_film, guide, {}};
+    if (built != nullptr) {
+        work.after_pass = built->after_pass;
+    }
     CheckpointKeeper keeper(options.checkpoint, identity);
     resume(scene, keeper, work);
     {
@@ -274,7 +300,7 @@ void RenderSession::Impl::render(const Scene& scene, const RenderIdentity& ident
     begin(scene, work);
     render_passes(settings, keeper, work);
     keep(keeper, work);
-    if (settings.guiding != GuidingMode::Off) {
+    if (settings.guiding != GuidingMode::Off && built == nullptr) {
         std::vector<std::byte> bytes = field_to_bytes(work.guide, settings.guiding);
         const std::lock_guard lock(mutex);
         field = std::move(bytes);
@@ -304,7 +330,7 @@ void RenderSession::Impl::render_passes(const RenderSettings& settings,
         PassSettings pass = next_pass(done, settings.samples, pixels);
         pass.samples =
             std::min({pass.samples, work.guide.most_samples(done), options.pass_samples});
-        pass.weight = work.guide.weights().of(done);
+        pass.weight = work.guide.weight(done);
         pass.offset = options.sample_offset;
         if ((done > 0 && stop.reached()) || !render_pass(pass, stop, work)) {
             finish_pass(work);
@@ -314,6 +340,9 @@ void RenderSession::Impl::render_passes(const RenderSettings& settings,
         work.guide.see(work.film.film, done);
         learn(work);
         finish_pass(work);
+        if (work.after_pass) {
+            work.after_pass(work.guide);
+        }
         if (keeper.due()) {
             keep(keeper, work);
         }
@@ -404,6 +433,16 @@ RenderSession::RenderSession(SceneDescription description, SessionOptions option
     impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
         impl->run(std::move(scene));
     });
+}
+
+RenderSession::RenderSession(const BuiltScene& built, unsigned threads)
+    : impl_(std::make_unique<Impl>()) {
+    const SceneDescription& description = built.scene.description;
+    impl_->options = with_threads(threads);
+    impl_->width = description.film.crop_width;
+    impl_->height = description.film.crop_height;
+    impl_->passes = PassLayout(description.passes.wanted);
+    impl_->driver = std::jthread([impl = impl_.get(), built] { impl->run_built(built); });
 }
 
 RenderSession::~RenderSession() {

@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,6 +20,9 @@
 #include "session/guide_status.h"
 
 namespace pharos {
+
+class GuideController;
+struct Scene;
 
 enum class SessionState : std::uint8_t { Building, Rendering, Finished, Cancelled, Failed };
 
@@ -75,11 +79,21 @@ struct SessionOptions {
     CheckpointOptions checkpoint;
 };
 
+// A scene that is built already, and a guide that may have learned from earlier pictures. Both
+// belong to the session until it has ended.
+struct BuiltScene {
+    const Scene& scene;
+    GuideController& guide;
+    std::function<void(const GuideController&)>
+        after_pass;  // on the session's thread; may be empty
+};
+
 class RenderSession {
   public:
     // Takes the description; work begins at once on threads of the session.
     explicit RenderSession(SceneDescription description, unsigned threads = 0);
     RenderSession(SceneDescription description, SessionOptions options);
+    RenderSession(const BuiltScene& built, unsigned threads);
     ~RenderSession();
     RenderSession(const RenderSession&) = delete;
     RenderSession& operator=(const RenderSession&) = delete;

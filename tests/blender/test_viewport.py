@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import subprocess
 import time
+from pathlib import Path
 
 import bpy
 import harness
@@ -61,9 +62,11 @@ def expect(shot, fractions, linear) -> None:
     assert np.abs(seen - encoded(linear)).max() <= 2.5, (fractions, seen, encoded(linear))
 
 
-def view_state() -> tuple:
-    data = area().spaces[0].region_3d
-    return data, data.view_rotation.copy()
+def viewport():
+    """Ours, that the first area shows."""
+    from pharos.viewport import viewport_of
+
+    return viewport_of(area())
 
 
 def step_prepare():
@@ -130,6 +133,75 @@ def step_delete_shows():
     expect(screenshot(), (0.45, 0.4), (0.2, 0.5, 0.1))
 
 
+def step_border():
+    space = area().spaces[0]
+    space.region_3d.view_perspective = "PERSP"
+    space.use_render_border = True
+    space.render_border_min_x, space.render_border_max_x = 0.25, 0.75
+    space.render_border_min_y, space.render_border_max_y = 0.5, 0.9
+    area().tag_redraw()
+
+
+def step_border_shows_a_part():
+    session = viewport().session
+    assert session.wait(0.0), "still rendering"
+    pixels = session.picture()[0]
+    region = window_region()
+    assert abs(pixels.shape[1] - 0.5 * region.width) <= 1, pixels.shape
+    assert abs(pixels.shape[0] - 0.4 * region.height) <= 1, pixels.shape
+    shot = screenshot()
+    expect(shot, (0.3, 0.55), (0.2, 0.5, 0.1))
+    outside = shot[int(0.2 * shot.shape[0]), int(0.1 * shot.shape[1])]
+    assert np.abs(outside - encoded((0.2, 0.5, 0.1))).max() > 10, outside
+    area().spaces[0].use_render_border = False
+
+
+def step_learn_lobes():
+    scene = bpy.context.scene
+    scene.pharos.guiding = "NEURAL"
+    scene.pharos.preview_samples = 16
+    plain = harness.material("Plain")
+    diffuse = harness.node(plain, "ShaderNodeBsdfDiffuse")
+    harness.connect(plain, diffuse.outputs[0], harness.surface(plain))
+    harness.add_object(harness.plane_mesh("Floor", 4.0), plain)
+    area().spaces[0].region_3d.view_rotation = (1.0, 0.0, 0.0, 0.0)
+    area().spaces[0].region_3d.view_location = (0.0, 0.0, 0.0)
+
+
+_asked: dict = {}  # the question, and what was shown before its answer
+
+
+def step_ask_lobes():
+    from pharos import lobes
+
+    session = viewport().session
+    assert session.wait(0.0) and session.progress().render.guiding.snapshots > 0
+    region = window_region()
+    _asked["question"] = lobes.ask(viewport(), 0.5 * region.width, 0.5 * region.height)
+    assert _asked["question"] > 0
+    _asked["before"] = screenshot()
+
+
+def step_lobes_are_drawn():
+    from pharos import lobes
+
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+        assert lobes.show_answer(viewport(), bpy.context, _asked["question"])
+    probe = lobes.overlay.probe
+    assert probe.hit and probe.lobes, lobes.words(probe)
+    changed = np.abs(screenshot() - _asked["before"]).max(-1) > 40
+    assert changed.sum() > 30, f"{changed.sum()} pixels changed"
+
+
+def step_lobes_go():
+    from pharos import lobes
+
+    lobes.overlay.hide()
+    bpy.data.objects.remove(bpy.data.objects["Floor"])
+    bpy.context.scene.pharos.guiding = "OFF"
+
+
 def step_navigate():
     data = area().spaces[0].region_3d
     data.view_perspective = "PERSP"
@@ -169,11 +241,22 @@ def step_close_area():
             bpy.ops.screen.area_close()
 
 
+def thread_count() -> int:
+    return sum(1 for _ in Path("/proc/self/task").iterdir())
+
+
 def step_toggle_shading():
-    for _ in range(8):
-        for kind in ("SOLID", "RENDERED"):
+    shade("SOLID")
+    _asked["threads"] = thread_count()
+    for _ in range(15):
+        for kind in ("RENDERED", "SOLID"):
             shade(kind)
             bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
+def step_no_thread_is_left():
+    assert thread_count() <= _asked["threads"], (thread_count(), _asked["threads"])
+    shade("RENDERED")
 
 
 def step_switch_engine():

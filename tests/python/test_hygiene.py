@@ -93,7 +93,8 @@ def test_no_fast_math():
 
 def test_commands_can_be_run():
     for name in ("scenes/render", "scenes/build", "tests/run", "tests/welch",
-                 "tests/benchmark/run", "tests/benchmark/slides", ".ci/run"):
+                 "tests/benchmark/run", "tests/benchmark/slides", "tests/benchmark/viewport",
+                 "tests/fuzz_edits", ".ci/run"):
         assert (ROOT / name).stat().st_mode & 0o111, f"{name} has no run bit"
 
 

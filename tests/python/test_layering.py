@@ -29,7 +29,12 @@ ALLOWED["bench"] += " support"  # the unit tests' builders of scenes
 # A library and the only places that may know it.
 HOMES = {
     # The bench compares with a bare loop over the same rays.
-    r"<embree\d?/": {"geometry/accelerator.cpp", "bench/accelerator_bench.cpp"},
+    r"<embree\d?/": {
+        "geometry/accelerator.cpp",
+        "geometry/embree_build.cpp",
+        "geometry/embree_build.h",
+        "bench/accelerator_bench.cpp",
+    },
     r"<OpenImageIO/": {"image/image_io.cpp"},
     r"<pybind11/": {"bindings/"},
     r"<hwy/": {"guiding/", "bench/"},

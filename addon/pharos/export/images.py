@@ -8,6 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .library import digest, file_state
+
 _DATA_SPACES = {"Non-Color", "Raw", "Generic Data", "Non-Colour Data"}
 _LINEAR_SPACES = {
     "Linear",
@@ -83,11 +85,12 @@ def tile_path(path: str, number: int) -> str:
 class ImageTable:
     """Images of one description, each added once."""
 
-    def __init__(self, native, description, report, frame: int = 1):
+    def __init__(self, native, description, report, frame: int = 1, library=None):
         self._native = native
         self._description = description
         self._report = report
         self._frame = frame
+        self._library = library
         self._indices: dict[tuple, int] = {}
 
     def index(self, image, user=None, tile: int = 1001) -> int:
@@ -126,7 +129,6 @@ class ImageTable:
         return image.packed_files[place].packed_file if place < len(image.packed_files) else None
 
     def _add(self, image, path: str, tile: int) -> int:
-        fields = {"name": image.name}
         space, exact = color_space(image.colorspace_settings.name)
         alpha = _ALPHA[image.alpha_mode]
         if not exact:
@@ -134,23 +136,42 @@ class ImageTable:
             self._report.warn(image.name, f"Colour space {name!r} is read as {space}.")
         if image.source == "MOVIE":
             self._report.warn(image.name, "One picture of this movie is used.")
-        if self._lives_in_blender(image):
-            if image.source == "TILED":
-                self._report.warn(image.name, "Of tiles that are not saved, the first is used.")
-            fields["pixels"] = _pixels(image)
-            if image.is_float:
-                # Blender holds such pixels scene-linear and multiplied by alpha.
-                space = space if space == "Data" else "Linear"
-                alpha = alpha if alpha in {"ChannelPacked", "None_"} else "Premultiplied"
-        elif (packed := self._packed(image, tile)) is not None:
-            fields["data"] = packed.data
-        else:
-            fields["path"] = path
+        in_blender = self._lives_in_blender(image)
+        if in_blender and image.source == "TILED":
+            self._report.warn(image.name, "Of tiles that are not saved, the first is used.")
+        if in_blender and image.is_float:
+            # Blender holds such pixels scene-linear and multiplied by alpha.
+            space = space if space == "Data" else "Linear"
+            alpha = alpha if alpha in {"ChannelPacked", "None_"} else "Premultiplied"
+        place = None if self._library is None else self._library.image_place(image, path)
+        version = None if place is None else self._library.images.at(place)
+        if version is not None:
+            return self._description.add_kept_image(image.name, version)
+        content = self._pixels(image) if in_blender else self._file(image, path, tile)
+        if self._library is not None and content:
+            parts = [image.name_full, space, alpha, *content.items(), file_state(path)]
+            version, known = self._library.images.of(digest(parts), place)
+            if known:
+                return self._description.add_kept_image(image.name, version)
         return self._description.add_image(
+            name=image.name,
             color_space=getattr(self._native.ImageColorSpace, space),
             alpha=getattr(self._native.ImageAlpha, alpha),
-            **fields,
+            version=version or 0,
+            **content,
         )
+
+    @staticmethod
+    def _pixels(image) -> dict:
+        pixels = _pixels(image)
+        return {} if pixels is None else {"pixels": pixels}
+
+    def _file(self, image, path: str, tile: int) -> dict:
+        """The one of data and path that leads to the picture; {}: none does."""
+        packed = self._packed(image, tile)
+        if packed is not None:
+            return {"data": packed.data}
+        return {"path": path} if path else {}
 
     @staticmethod
     def _lives_in_blender(image) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .attributes import instance_value, read_attributes
+from .library import digest
 from .lights import light_fields
 from .meshes import add_mesh, evaluated_mesh, read_mesh
 from .visibility import Visibility
@@ -34,6 +35,7 @@ class InstanceExporter:
         self._native = context.native
         self._visibility = Visibility(context.native, context.view_layer, context.report)
         self._meshes: dict[tuple, int | None] = {}
+        self._sent: dict[int, int] = {}  # index in the description by version
         self._names: list[str] = []
         self._attributes: dict[str, dict[int, tuple]] = {}  # by name and row
         self._rows: list[tuple[int, int, int, int]] = []  # place in depsgraph, mesh, set, bits
@@ -101,10 +103,26 @@ class InstanceExporter:
         slots = len(obj.material_slots)
         key = (obj.data.as_pointer(), uses_uv, slots, attributes)
         if key not in self._meshes:
-            self._meshes[key] = self._read(obj, slots, uses_uv, attributes)
+            self._meshes[key] = self._kept(obj, slots, uses_uv, attributes)
         return self._meshes[key]
 
-    def _read(self, obj, slots: int, uses_uv: bool, attributes: frozenset) -> int | None:
+    def _kept(self, obj, slots: int, uses_uv: bool, attributes: frozenset) -> int | None:
+        """Without reading it, where a live session has the mesh as it is."""
+        library = self._context.library
+        if library is None:
+            return self._read(obj, slots, uses_uv, attributes, None)
+        place = library.mesh_place(obj, slots, uses_uv, attributes)
+        version = None if place is None else library.meshes.at(place)
+        if version is None:
+            return self._read(obj, slots, uses_uv, attributes, place)
+        return self._add_kept(obj.data.name, version)
+
+    def _add_kept(self, name: str, version: int) -> int:
+        if version not in self._sent:
+            self._sent[version] = self._context.description.add_kept_mesh(name, version)
+        return self._sent[version]
+
+    def _read(self, obj, slots: int, uses_uv: bool, attributes: frozenset, place) -> int | None:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
@@ -115,7 +133,17 @@ class InstanceExporter:
                 found = read_attributes(mesh, attributes, self._context.report)
                 arrays = arrays._replace(attributes=found)
             self._context.progress(obj.name)
-            return add_mesh(self._native, self._context.description, obj.data.name, arrays)
+            return self._add_mesh(obj.data.name, arrays, place)
+
+    def _add_mesh(self, name: str, arrays, place) -> int:
+        description, library = self._context.description, self._context.library
+        if library is None:
+            return add_mesh(self._native, description, name, arrays)
+        version, known = library.meshes.of(digest(arrays), place)
+        if known:
+            return self._add_kept(name, version)
+        self._sent[version] = add_mesh(self._native, description, name, arrays, version)
+        return self._sent[version]
 
     def _add_rows(self, matrices: np.ndarray) -> None:
         if not self._rows:

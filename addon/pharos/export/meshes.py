@@ -105,9 +105,10 @@ def read_mesh(mesh, slot_count: int, with_uv: bool) -> MeshArrays | None:
     )
 
 
-def add_mesh(native, description, name: str, arrays: MeshArrays) -> int:
+def add_mesh(native, description, name: str, arrays: MeshArrays, version: int = 0) -> int:
     return description.add_mesh(
         name=name,
+        version=version,
         positions=arrays.positions,
         triangles=arrays.triangles,
         normal_domain=getattr(native.NormalDomain, arrays.domain),

@@ -30,6 +30,7 @@ class ExportContext:
     should_stop: Callable[[], bool]
     progress: Callable[[str], None]
     passes: PassRequest
+    library: Any = None  # of a live session: what it holds is not handed over again
     images: Any = None
     materials: Any = None
 
@@ -48,6 +49,7 @@ def export_scene(
     should_stop: Callable[[], bool] = lambda: False,
     progress: Callable[[str], None] = lambda name: None,
     passes: PassRequest | None = None,
+    library=None,
 ):
     """A description of everything but the view. Raises instances.Cancelled."""
     scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
@@ -62,8 +64,9 @@ def export_scene(
         should_stop,
         progress,
         passes or PassRequest(),
+        library,
     )
-    context.images = ImageTable(native, description, report, scene.frame_current)
+    context.images = ImageTable(native, description, report, scene.frame_current, library)
     context.materials = MaterialTable(context)
     context.passes.material_indices = context.materials.pass_indices
     description.set_settings(**render_settings(native, scene, view_layer))

@@ -85,7 +85,7 @@ Attacked render_under(const Attack& attack, SceneDescription description, std::u
     for (std::uint32_t pass = 0; pass < passes; ++pass) {
         const std::uint64_t vertices = integrator.statistics().vertices;
         EXPECT_TRUE(integrator.render_pass(
-            {pass, 1, guide.weights().of(pass)}, guide.next_pass(), film, {cancel, {}}));
+            {pass, 1, guide.weight(pass)}, guide.next_pass(), film, {cancel, {}}));
         guide.see(film.film, pass + 1);
         RecordBuffer records = integrator.take_records();
         std::ranges::sort(records.radiance, {}, &RadianceRecord::key);

@@ -1,0 +1,104 @@
+// pharos-cli adapt: how fast the guide follows a lamp that moves.
+#include <algorithm>
+#include <cstdio>
+
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "scene/dump.h"
+#include "session/adaptation.h"
+
+namespace pharos::cli {
+
+namespace {
+
+constexpr double kNear = 1.2;  // of the settled error: the guide has followed
+
+struct Options : CommonOptions {
+    AdaptationSettings adaptation;
+    std::vector<std::uint32_t> size;
+};
+
+Vec3 parse_offset(const std::string& name, const std::string& text) {
+    const std::vector<std::string> parts = split(text, ',');
+    if (parts.size() != 3) {
+        throw UsageError(name + ": '" + text + "' is not X,Y,Z");
+    }
+    Vec3 offset;
+    for (int axis = 0; axis < 3; ++axis) {
+        offset[axis] = parse_number<float>(name, parts[static_cast<std::size_t>(axis)]);
+    }
+    return offset;
+}
+
+void parse_option(const std::string& name, const std::string& value, Options& options) {
+    AdaptationSettings& a = options.adaptation;
+    if (options.take(name, value)) {
+        return;
+    }
+    if (name == "--lamp") {
+        a.lamp = value;
+    } else if (name == "--move") {
+        a.offset = parse_offset(name, value);
+    } else if (name == "--frames") {
+        a.frames = std::max(parse_number<std::uint32_t>(name, value), 2u);
+    } else if (name == "--learned") {
+        a.learned = parse_number<std::uint32_t>(name, value);
+    } else if (name == "--reference") {
+        a.reference = std::max(parse_number<std::uint32_t>(name, value), 1u);
+    } else if (name == "--size") {
+        options.size = parse_list(name, value);
+    } else {
+        throw UsageError("unknown option '" + name + "'");
+    }
+}
+
+void set_size(FilmDescription& film, const std::vector<std::uint32_t>& size) {
+    film.width = film.crop_width = size[0];
+    film.height = film.crop_height = size[1];
+    film.crop_x = film.crop_y = 0;
+}
+
+void print(const Adaptation& a) {
+    std::printf("%5s %10s %10s %10s  kept / unguided\n", "frame", "kept", "fresh", "unguided");
+    double worst = 0.0;
+    for (std::size_t i = 0; i < a.kept.size(); ++i) {
+        const double ratio = a.kept[i] / a.unguided[i];
+        worst = std::max(worst, ratio);
+        std::printf(
+            "%5zu %10.5f %10.5f %10.5f  %.3f\n", i, a.kept[i], a.fresh[i], a.unguided[i], ratio);
+    }
+    std::printf(
+        "settled %.5f; within %.1fx of it after %zu frames kept, %zu from nothing "
+        "(of %zu); kept / unguided at most %.3f\n",
+        a.settled,
+        kNear,
+        a.frames_until(a.kept, kNear),
+        a.frames_until(a.fresh, kNear),
+        a.kept.size(),
+        worst);
+}
+
+}  // namespace
+
+int adapt(const std::vector<std::string>& arguments) {
+    Options options;
+    options.input = walk_arguments(
+        arguments,
+        [](const std::string&) { return false; },
+        [&](const std::string& name, const std::string& value) {
+            parse_option(name, value, options);
+        });
+    if (options.input.empty() || (!options.size.empty() && options.size.size() != 2)) {
+        throw UsageError("adapt needs an input file; --size is W,H");
+    }
+    options.adaptation.threads = options.threads;
+    SceneDescription description = read_dump(options.input);
+    options.apply(description.settings);
+    if (!options.size.empty()) {
+        set_size(description.film, options.size);
+    }
+    print(measure_adaptation(description, options.adaptation));
+    return 0;
+}
+
+}  // namespace pharos::cli

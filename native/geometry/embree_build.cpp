@@ -1,0 +1,152 @@
+#include "geometry/embree_build.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/fp_state.h"
+
+namespace pharos {
+
+namespace {
+
+constexpr std::size_t kShortBuild = 100000;  // triangles or instances, tens of ms
+constexpr std::chrono::milliseconds kPollInterval(5);
+constexpr std::chrono::milliseconds kPatience(100);  // with a build that has been told to stop
+
+bool on_memory(void* user, ssize_t change, bool /*post*/) {
+    auto& device = *static_cast<EmbreeDevice*>(user);
+    device.bytes.fetch_add(change, std::memory_order_relaxed);
+    // A refused allocation ends a build early; releases are never refused.
+    return change <= 0 || !device.stop.load(std::memory_order_relaxed);
+}
+
+bool on_progress(void* user, double /*fraction*/) {
+    return !static_cast<const EmbreeDevice*>(user)->stop.load(std::memory_order_relaxed);
+}
+
+struct Commit {
+    BuildTarget target;
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool done = false;
+    RTCError error = RTC_ERROR_NONE;
+
+    void run() {
+        const FloatStateGuard float_state;
+        rtcCommitScene(target.scene);
+        const std::lock_guard lock(mutex);
+        error = rtcGetDeviceError(target.device->device.get());  // errors are kept by thread
+        done = true;
+        changed.notify_all();
+    }
+
+    // True when the build has ended within the time.
+    bool wait(std::chrono::milliseconds time) {
+        std::unique_lock lock(mutex);
+        return changed.wait_for(lock, time, [this] { return done; });
+    }
+};
+
+// Builds that were cancelled but still run: Embree asks its monitor only between stages, which take
+// up to seconds for ten million triangles. They are joined when they have ended or, at the latest,
+// when the process exits, because Embree must not be torn down under them.
+class AbandonedBuilds {
+  public:
+    static AbandonedBuilds& instance() {
+        static AbandonedBuilds builds;
+        return builds;
+    }
+
+    void keep(std::jthread thread, std::shared_ptr<Commit> commit) {
+        const std::lock_guard lock(mutex_);
+        std::erase_if(builds_, [](const Build& build) {
+            return build.commit->wait(std::chrono::milliseconds(0));
+        });
+        builds_.push_back({std::move(commit), std::move(thread)});
+    }
+
+  private:
+    struct Build {
+        std::shared_ptr<Commit> commit;
+        std::jthread thread;  // joined before commit goes
+    };
+
+    std::mutex mutex_;
+    std::vector<Build> builds_;
+};
+
+}  // namespace
+
+// No threads= here: it would set the task scheduler's limit for the whole process, host included.
+EmbreeDevice::EmbreeDevice() : device(rtcNewDevice(nullptr)) {
+    if (device == nullptr) {
+        throw std::runtime_error("Embree cannot be started");
+    }
+    if (rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION) / 10000 != 3 ||
+        rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) {
+        throw std::runtime_error("Embree 3 with ray masks is needed");
+    }
+    rtcSetDeviceMemoryMonitorFunction(device.get(), on_memory, this);
+}
+
+ScenePtr make_scene(EmbreeDevice& device) {
+    ScenePtr scene(rtcNewScene(device.device.get()));
+    if (scene == nullptr) {
+        throw std::bad_alloc();
+    }
+    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
+    rtcSetSceneProgressMonitorFunction(scene.get(), on_progress, &device);
+    return scene;
+}
+
+void throw_if_cancelled(const CancelFlag& cancel) {
+    if (cancel.cancelled()) {
+        throw Cancelled();
+    }
+}
+
+void throw_if_failed(RTCError error) {
+    switch (error) {
+        case RTC_ERROR_NONE:
+            return;
+        case RTC_ERROR_OUT_OF_MEMORY:
+            throw std::bad_alloc();
+        case RTC_ERROR_CANCELLED:
+            throw Cancelled();
+        default:
+            throw std::runtime_error("Embree error " + std::to_string(error));
+    }
+}
+
+void commit_scene(const BuildTarget& target, std::size_t primitives, const CancelFlag& cancel) {
+    throw_if_cancelled(cancel);
+    const auto commit = std::make_shared<Commit>();
+    commit->target = target;
+    if (primitives < kShortBuild) {
+        commit->run();
+    } else {
+        std::jthread thread([commit] { commit->run(); });
+        while (!commit->wait(kPollInterval)) {
+            if (!cancel.cancelled()) {
+                continue;
+            }
+            target.device->stop.store(true, std::memory_order_relaxed);
+            if (!commit->wait(kPatience)) {
+                AbandonedBuilds::instance().keep(std::move(thread), commit);
+            }
+            throw Cancelled();
+        }
+    }
+    throw_if_cancelled(cancel);
+    throw_if_failed(commit->error);
+}
+
+}  // namespace pharos
