@@ -18,6 +18,7 @@ from .export.report import Report
 from .export.scene import export_scene, set_view
 from .export.settings import viewport_samples
 from .final import stats_line
+from .passes import PASSES
 
 _SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
 _LONGEST_INTERVAL = 0.5
@@ -149,7 +150,7 @@ class Viewport:
         # Until each pixel has a sample the last picture looks better, but not for long.
         if progress.samples == 0 and progress.elapsed < _PATIENCE:
             return
-        pixels = output.read_pass(self._native, session, "Combined")
+        pixels = output.read_pass(self._native, session, PASSES[0])
         if pixels is None:
             return
         size = (session.width, session.height)
