@@ -324,7 +324,7 @@ struct ImageUse {
     ImageExtension extension = ImageExtension::Repeat;
     ImageProjection projection = ImageProjection::Flat;
     float projection_blend = 0.0f;
-    std::vector<ImageTile> tiles;  // of a tiled image; elsewhere there is nothing
+    std::vector<ImageTile> tiles = {};  // of a tiled image; elsewhere there is nothing
 };
 
 struct NodeProgram {
