@@ -2,10 +2,12 @@
 #include <utility>
 
 #include "camera/camera.h"
+#include "core/color.h"
 #include "core/fp_state.h"
 #include "core/parallel.h"
 #include "film/passes.h"
 #include "image/image_io.h"
+#include "scene/displace.h"
 #include "scene/mend.h"
 #include "scene/scene.h"
 #include "scene/world.h"
@@ -42,6 +44,11 @@ class SceneBuild {
         poll();
         compile_materials();
         make_shading_context();
+        if (displace_meshes(*scene_, cancel_)) {
+            make_shading_context();
+            scene_->surfaces =
+                make_instance_surfaces(scene_->description.meshes, scene_->instances);
+        }
         poll();
         scene_->accelerator =
             std::make_unique<Accelerator>(scene_->description.meshes, scene_->instances, cancel_);
@@ -116,16 +123,26 @@ void SceneBuild::load_textures() {
     SceneDescription& d = scene_->description;
     std::vector<bool> used(d.images.size());
     const auto mark = [&](const NodeProgram& program) {
+        const auto mark_one = [&](std::uint32_t image) {
+            if (image < used.size()) {
+                used[image] = true;
+            }
+        };
         for (const ImageUse& use : program.images) {
-            if (use.image < used.size()) {
-                used[use.image] = true;
+            mark_one(use.image);
+            for (const ImageTile& tile : use.tiles) {
+                mark_one(tile.image);
             }
         }
     };
     for (const MaterialDescription& material : d.materials) {
         mark(material.program);
+        mark(material.displacement);
     }
     mark(d.world.program);
+    for (const NodeProgram& program : d.light_programs) {
+        mark(program);
+    }
     scene_->textures.resize(d.images.size());
     std::vector<SceneReport> reports(d.images.size());
     pool_.parallel_for(d.images.size(), [&](std::size_t i, unsigned /*worker*/) {
@@ -150,14 +167,25 @@ void SceneBuild::compile_materials() {
         scene_->materials.push_back(compile_material(
             material.name, std::move(material.program), report_, scene_->textures));
         scene_->materials.back().emission_sampling = material.emission_sampling;
+        scene_->displacements.emplace_back();
+        if (!material.displacement.ops.empty()) {
+            scene_->displacements.back() = compile_material(
+                material.name, std::move(material.displacement), report_, scene_->textures);
+        }
     }
+    scene_->displacements.emplace_back();
     scene_->materials.push_back(compile_material("Default", default_program(), report_));
     scene_->world =
         compile_material("World", std::move(d.world.program), report_, scene_->textures);
+    for (NodeProgram& program : d.light_programs) {
+        scene_->lamp_materials.push_back(
+            compile_material("Light", std::move(program), report_, scene_->textures));
+    }
 }
 
 void SceneBuild::make_shading_context() {
     const SceneDescription& d = scene_->description;
+    scene_->mesh_bounds.clear();
     for (const Mesh& mesh : d.meshes) {
         poll();
         Bounds3 bounds;
@@ -238,8 +266,17 @@ void SceneBuild::make_lights() {
         collect_emitters(i, emitters);
     }
     scene_->needs.emissive_triangles = !emitters.empty();
+    std::vector<float> scales;
+    for (LightDescription& lamp : scene_->description.lights) {
+        const bool has_program = lamp.program < scene_->lamp_materials.size();
+        lamp.program = has_program ? lamp.program : kNone;
+        scales.push_back(
+            has_program ? average(glm::abs(scene_->lamp_materials[lamp.program].emission_estimate))
+                        : 1.0f);
+    }
     LightSamplerInput input;
     input.lamps = scene_->description.lights;
+    input.lamp_scales = scales;
     input.blender_version = scene_->description.blender_version;
     input.triangles = emitters;
     input.meshes = scene_->description.meshes;
@@ -260,6 +297,11 @@ void SceneBuild::find_needs() {
     needs.nee = !scene_->lights->empty();
     needs.textures = needs.environment && scene_->world.textured;
     needs.light_path = needs.environment && scene_->world.asks_path;
+    needs.lamp_programs = !scene_->lamp_materials.empty();
+    for (const Material& material : scene_->lamp_materials) {
+        needs.textures = needs.textures || material.textured;
+        needs.light_path = needs.light_path || material.asks_path;
+    }
     needs.all_constant = true;
     for (std::size_t i = 0; i < used.size(); ++i) {
         const Material& material = scene_->materials[i];
