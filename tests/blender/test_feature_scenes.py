@@ -117,18 +117,11 @@ def test_worlds():
     picture.image.generated_type = "COLOR_GRID"
     tree.links.new(picture.outputs[0], background.inputs[0])
     _check("picture of surroundings", 512)
-    if harness.VERSION < (5, 0, 0):
-        sky = tree.nodes.new("ShaderNodeTexSky")
-        sky.sky_type, sky.sun_disc, sky.sun_elevation = "NISHITA", False, 0.5
-        background.inputs[1].default_value = 0.3
-        tree.links.new(sky.outputs[0], background.inputs[0])
-        _check("scattered sky", 512)
 
 
 def test_lobes():
     for kind, inputs in (
         ("ShaderNodeBsdfGlossy", {"Roughness": 0.3}),
-        ("ShaderNodeBsdfTranslucent", {}),
         ("ShaderNodeBsdfGlass", {"Roughness": 0.4, "IOR": 1.4}),
         ("ShaderNodeBsdfPrincipled", {"Metallic": 0.4, "Roughness": 0.35}),
     ):
