@@ -203,7 +203,8 @@ def test_skies():
             f"largest {ratio.max():.4f}"
         )
         assert np.median(ratio) < tolerance, (fields, np.median(ratio))
-        if fields["sky_type"] == "NISHITA":
+        # Below the horizon 3.x shows something else.
+        if fields["sky_type"] == "NISHITA" and _NEW:
             assert mean < tolerance and ratio.max() < 5.0 * tolerance, (fields, mean, ratio.max())
 
 
