@@ -78,6 +78,14 @@ void bind_programs(py::module_& m) {
         py::arg("program"));
     m.def("random_of_name", &random_of_name, FloatGuard(), py::arg("name"));
 
+    py::class_<ImageTile>(m, "ImageTile", py::module_local())
+        .def(py::init([](std::uint32_t number, std::uint32_t image) {
+                 return ImageTile{number, image};
+             }),
+             py::arg("number"),
+             py::arg("image"))
+        .def_readonly("number", &ImageTile::number)
+        .def_readonly("image", &ImageTile::image);
     py::class_<ImageUse>(m, "ImageUse", py::module_local())
         .def(py::init([](const py::kwargs& fields) {
                  ImageUse use;
@@ -89,7 +97,8 @@ void bind_programs(py::module_& m) {
         .def_readwrite("interpolation", &ImageUse::interpolation)
         .def_readwrite("extension", &ImageUse::extension)
         .def_readwrite("projection", &ImageUse::projection)
-        .def_readwrite("projection_blend", &ImageUse::projection_blend);
+        .def_readwrite("projection_blend", &ImageUse::projection_blend)
+        .def_readwrite("tiles", &ImageUse::tiles);
 
     py::class_<NodeProgram>(m, "NodeProgram", py::module_local())
         .def(py::init<>())

@@ -210,7 +210,8 @@ void bind_parts(py::module_& m) {
     py::class_<MaterialDescription>(m, "MaterialDescription", py::module_local())
         .def_readonly("name", &MaterialDescription::name)
         .def_readonly("program", &MaterialDescription::program)
-        .def_readonly("emission_sampling", &MaterialDescription::emission_sampling);
+        .def_readonly("emission_sampling", &MaterialDescription::emission_sampling)
+        .def_readonly("displacement", &MaterialDescription::displacement);
     py::class_<ImageDescription>(m, "ImageDescription", py::module_local())
         .def_readonly("name", &ImageDescription::name)
         .def_readonly("path", &ImageDescription::path)
@@ -240,7 +241,8 @@ void bind_parts(py::module_& m) {
         .def_readwrite("cast_shadow", &LightDescription::cast_shadow)
         .def_readwrite("use_mis", &LightDescription::use_mis)
         .def_readwrite("visibility", &LightDescription::visibility)
-        .def_readwrite("max_bounces", &LightDescription::max_bounces);
+        .def_readwrite("max_bounces", &LightDescription::max_bounces)
+        .def_readwrite("program", &LightDescription::program);
     py::class_<WorldDescription>(m, "WorldDescription", py::module_local())
         .def_readwrite("program", &WorldDescription::program)
         .def_readwrite("map_resolution", &WorldDescription::map_resolution)
@@ -357,14 +359,22 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("values"))
         .def(
             "add_material",
-            [](SceneDescription& s, std::string name, NodeProgram program, bool emission_sampling) {
-                s.materials.push_back({std::move(name), std::move(program), emission_sampling});
+            [](SceneDescription& s,
+               std::string name,
+               NodeProgram program,
+               bool emission_sampling,
+               std::optional<NodeProgram> displacement) {
+                s.materials.push_back({std::move(name),
+                                       std::move(program),
+                                       emission_sampling,
+                                       std::move(displacement).value_or(NodeProgram())});
                 return index_of_last(s.materials.size());
             },
             FloatGuard(),
             py::arg("name"),
             py::arg("program"),
-            py::arg("emission_sampling") = true)
+            py::arg("emission_sampling") = true,
+            py::arg("displacement") = py::none())
         .def(
             "add_material_set",
             [](SceneDescription& s, std::vector<std::uint32_t> slots) {
@@ -430,6 +440,15 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("name"),
             py::arg("version"))
         .def(
+            "add_light_program",
+            [](SceneDescription& s, const NodeProgram& program) {
+                s.light_programs.push_back(program);
+                return index_of_last(s.light_programs.size());
+            },
+            FloatGuard(),
+            py::arg("program"),
+            "What a light refers to as its program.")
+        .def(
             "add_light",
             [](SceneDescription& s, const py::kwargs& fields) {
                 assign_fields(s.lights.emplace_back(), fields);
@@ -494,6 +513,7 @@ void bind_scene(py::module_& m) {
             "copy", [](const SceneDescription& s) { return SceneDescription(s); }, FreeGuard())
         .def("mesh", &mesh_as_dict, FloatGuard(), py::arg("index"));
 
+    m.attr("DISPLACE_IN_WORLD") = static_cast<int>(kDisplaceInWorld);
     m.def("write_dump", &write_dump, FreeGuard(), py::arg("description"), py::arg("path"));
     m.def("read_dump", &read_dump, FreeGuard(), py::arg("path"));
 }

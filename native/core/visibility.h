@@ -14,6 +14,7 @@ enum VisibilityBits : std::uint32_t {
     kVisibleTransmission = 8,
     kVisibleShadow = 16,
     kVisibleAll = 31,
+    kVisibleByLobe = kVisibleDiffuse | kVisibleGlossy | kVisibleTransmission,
 };
 
 }  // namespace pharos

@@ -49,6 +49,11 @@ struct Channel<TexelType::U8> {
     static float get(Stored v) { return static_cast<float>(v) * (1.0f / 255.0f); }
 
     static Stored put(float v) { return static_cast<Stored>(saturate(v) * 255.0f + 0.5f); }
+
+    // Rounded down, as Cycles does: a step is visible where alpha is divided out again.
+    static Stored product(Stored v, Stored alpha) {
+        return static_cast<Stored>(unsigned{v} * unsigned{alpha} / 255u);
+    }
 };
 
 template <>
@@ -58,6 +63,10 @@ struct Channel<TexelType::U16> {
     static float get(Stored v) { return static_cast<float>(v) * (1.0f / 65535.0f); }
 
     static Stored put(float v) { return static_cast<Stored>(saturate(v) * 65535.0f + 0.5f); }
+
+    static Stored product(Stored v, Stored alpha) {
+        return static_cast<Stored>(std::uint32_t{v} * std::uint32_t{alpha} / 65535u);
+    }
 };
 
 template <>
@@ -108,6 +117,12 @@ void convert_texels(TexturePixels& pixels, const Conversion& conversion) {
         }
         std::array<Target, 4> out{};
         for (std::uint32_t k = 0; k < colors; ++k) {
+            if constexpr (requires { Channel<To>::product(in[0], in[0]); }) {
+                if (conversion.multiply && !conversion.to_linear) {
+                    out[k] = Channel<To>::product(in[k], in[colors]);
+                    continue;
+                }
+            }
             float value = Channel<From>::get(in[k]);
             if (conversion.to_linear) {
                 const bool divide = conversion.unmultiply && alpha > 0.0f;
@@ -180,7 +195,9 @@ Texture::Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha a
     associated_ = conversion.has_alpha && color_space != ImageColorSpace::Data &&
                   (alpha == ImageAlpha::Straight || alpha == ImageAlpha::Premultiplied);
     conversion.multiply = associated_ && alpha == ImageAlpha::Straight;
-    conversion.unmultiply = associated_ && alpha == ImageAlpha::Premultiplied;
+    // Cycles does not do that to floats.
+    conversion.unmultiply =
+        associated_ && alpha == ImageAlpha::Premultiplied && pixels_.type == TexelType::U16;
     if (conversion.changes_texels()) {
         convert(pixels_, conversion);
     }

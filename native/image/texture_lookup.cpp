@@ -51,9 +51,24 @@ template <ImageExtension Extension>
     }
 }
 
+// The texel that holds a point of a repeated image. At whole numbers below zero it is the one
+// before, as in Cycles.
+[[nodiscard]] int repeated_texel(float u, int size) {
+    constexpr float kFar = 1e6f;
+    const float x = u * static_cast<float>(size);
+    const int texel =
+        std::abs(x) < kFar
+            ? static_cast<int>(x) - (x < 0.0f ? 1 : 0)
+            : static_cast<int>(reduce<ImageExtension::Repeat>(u) * static_cast<float>(size));
+    return wrap<ImageExtension::Repeat>(texel, size);
+}
+
 template <int Count, ImageExtension Extension>
 [[nodiscard]] Taps<Count> make_taps(float u, int size) {
     Taps<Count> taps;
+    if constexpr (Count == 1 && Extension == ImageExtension::Repeat) {
+        return {{repeated_texel(u, size)}, {1.0f}};
+    }
     // Closest takes the texel that holds the point, the others lie around texel centres.
     const float x = reduce<Extension>(u) * static_cast<float>(size) - (Count == 1 ? 0.0f : 0.5f);
     const float base = std::floor(x);

@@ -3,6 +3,7 @@
 
 #include "core/color.h"
 #include "integrator/path_batch.h"
+#include "integrator/path_info.h"
 #include "integrator/render_context.h"
 #include "sampling/mis.h"
 
@@ -47,6 +48,45 @@ inline void add_chance_hit(const RenderContext& context,
         record.selection.hit_radiance += luminance(record.f_cos * L);
         record.selection.hit_pdf_light = context.settings().use_nee ? light_pdf : 0.0f;
     }
+}
+
+// Whether a ray sees a lamp or the world: as in Cycles a ray through a translucent surface is one
+// of transmission and a diffuse one, too.
+[[nodiscard]] inline bool sees_light(const PathCounters& counters,
+                                     std::uint32_t ray_bit,
+                                     std::uint32_t visibility) {
+    const bool diffuse = (counters.ray_kind & ray_kind_bit(LightPathOutput::IsDiffuseRay)) != 0;
+    return (visibility & ray_bit) != 0 && (!diffuse || (visibility & kVisibleDiffuse) != 0);
+}
+
+// add_chance_hit() of a lamp, whose nodes may have a say.
+inline void add_lamp_hit(const RenderContext& context,
+                         PathBatch& batch,
+                         std::uint32_t path,
+                         const Ray& ray,
+                         const LightHit& hit) {
+    Rgb L = hit.L;
+    if (hit.program != kNone) {
+        const Scene& scene = context.scene;
+        const LampPoint point =
+            scene.lights->lamp_point(hit.lamp, ray.origin, ray.direction, hit.distance);
+        const SurfaceInteraction at =
+            lamp_interaction(point, ray.direction, hit.distance, hit.program);
+        const ShadingContext shading =
+            shading_with_paths(scene, 1, batch.path_infos, [&](std::size_t) {
+                PathInfo info = path_info(batch.counters[path]);
+                info.kind = 0;
+                return info;
+            });
+        Rgb emitted(0.0f);
+        evaluate_emission(scene.lamp_materials[hit.program],
+                          shading,
+                          std::span(&at, 1),
+                          batch.scratch,
+                          std::span(&emitted, 1));
+        L *= emitted;
+    }
+    add_chance_hit(context, batch, path, L, hit.pdf);
 }
 
 }  // namespace pharos

@@ -125,7 +125,13 @@ struct PathBatch {
     std::vector<ShadowRay> shadow_rays;
     std::vector<Ray> shadow_queries;  // parallel to shadow_rays
     std::vector<std::uint8_t> occluded;
+    // those at transparent surfaces, waiting for the programs there
+    std::vector<SurfaceInteraction> shadow_surfaces;
+    std::vector<std::uint32_t> shadow_places;  // of each, into shadow_rays
+    std::vector<std::uint32_t> shadow_order;   // by material
+    std::vector<Rgb> transmittances;
     std::vector<PendingLight> pending_triangles;
+    std::vector<PendingLight> pending_lamps;  // those with a program; the emitter's material is it
     std::vector<PendingLight> pending_worlds;
     std::vector<SurfaceInteraction> pending_surfaces;
     std::vector<Vec3> pending_directions;

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "core/visibility.h"
+#include "geometry/surface_interaction.h"
 #include "integrator/path_batch.h"
+#include "lights/light.h"
 #include "materials/bsdf.h"
 #include "materials/material.h"
 #include "scene/scene.h"
@@ -54,6 +57,24 @@ namespace pharos {
     PathInfo info = world_path_info(counters);
     info.kind = shadow ? ray_kind_bit(LightPathOutput::IsShadowRay) : 0;
     return info;
+}
+
+// What a lamp's nodes are asked about; its material is the lamp's program.
+[[nodiscard]] inline SurfaceInteraction lamp_interaction(const LampPoint& point,
+                                                         const Vec3& wi,
+                                                         float distance,
+                                                         std::uint32_t program) {
+    constexpr float kFar = 1e18f;  // its square is still a number
+    SurfaceInteraction hit;
+    hit.p = point.p;
+    hit.ng = hit.ns = point.n;
+    hit.wo = -wi;
+    hit.t = std::min(distance, kFar);
+    hit.u = point.u;
+    hit.v = point.v;
+    hit.instance = hit.triangle = kNone;
+    hit.material = program;
+    return hit;
 }
 
 // The scene's shading context, which knows the paths where some program asks for them:

@@ -240,6 +240,27 @@ float spot_attenuation(const SpotCone& cone, const Vec3& wi) {
     return cone.extra_cosine ? cosine * edge : edge;
 }
 
+LampPoint lamp_point(const Lamp& lamp, const Vec3& from, const Vec3& wi, float distance) {
+    LampPoint point;
+    point.n = -wi;
+    if (is_distant(lamp)) {
+        point.p = -wi;
+        return point;
+    }
+    point.p = from + wi * distance;
+    const Vec3 q = point.p - lamp.center;
+    if (lamp.shape == LampShape::Sphere) {
+        point.n = normalize_or(q, point.n);
+    } else if (lamp.shape >= LampShape::Rectangle) {
+        point.n = lamp.frame.z;
+        const float along_u = 0.5f * glm::dot(q, lamp.dual_x) / lamp.half_u;
+        const float along_v = 0.5f * glm::dot(q, lamp.dual_y) / lamp.half_v;
+        point.u = along_v + 0.5f;
+        point.v = -along_u - along_v;
+    }
+    return point;
+}
+
 std::optional<LampSample> sample_lamp(const Lamp& lamp,
                                       const LightSampleContext& context,
                                       const Vec2& u) {

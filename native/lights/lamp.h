@@ -52,7 +52,8 @@ struct Lamp {
     std::uint32_t visibility = kVisibleAll;
     std::uint32_t max_bounces = 1024;
     std::uint32_t index = 0;  // in the description
-    Vec3 center;              // distant: unit vector towards the light
+    std::uint32_t program = kNone;
+    Vec3 center;          // distant: unit vector towards the light
     Rgb radiance{0.0f};   // Point: intensity; DistantPoint and Beam: irradiance across the light
     float radius = 0.0f;  // Disc, Sphere; DistantDisc: tan of the half angle
     float one_minus_cos = 0.0f;  // DistantCone, DistantDisc: of the half angle
@@ -88,6 +89,12 @@ struct LampHit {
     float t = 0.0f;
     float pdf = 0.0f;  // of sampling this direction from the context; 0 without one
 };
+
+// What a lamp's nodes are told of the point of it that shines along -wi, `distance` from `from`.
+[[nodiscard]] LampPoint lamp_point(const Lamp& lamp,
+                                   const Vec3& from,
+                                   const Vec3& wi,
+                                   float distance);
 
 // nullopt where nothing arrives.
 [[nodiscard]] std::optional<LampSample> sample_lamp(const Lamp& lamp,

@@ -31,12 +31,24 @@ struct LightSample {
     std::uint32_t max_bounces = 1024;
 };
 
+// A point of a lamp as Cycles tells node trees: of a sun p is where its light travels to; what
+// always faces the receiver has n = -wi. u and v: barycentrics such that (1 - u - v, u) runs over
+// an area light, along its x and y; elsewhere 0.
+struct LampPoint {
+    Vec3 p;
+    Vec3 n;
+    float u = 0.0f;
+    float v = 0.0f;
+};
+
 // Emission met by a ray, and the density next-event estimation would have had for it.
 struct LightHit {
     Rgb L{0.0f};
     float pdf = 0.0f;  // solid angle, choice included; 0: not sampled by NEE
     float distance = 0.0f;
     std::uint32_t light = 0;
+    std::uint32_t lamp = 0;               // of the sampler, for lamp_point()
+    std::uint32_t program = 0xffffffffu;  // what it emits multiplies L
     std::uint32_t visibility = 31;
 };
 

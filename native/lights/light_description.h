@@ -12,6 +12,7 @@ namespace pharos {
 enum class LightType : std::uint32_t { Point, Spot, Area, Sun };
 enum class AreaShape : std::uint32_t { Rectangle, Ellipse };
 
+// A lamp's node tree is a program of the scene's: what it emits multiplies the strength.
 // strength = colour x watts (x blackbody x 2^exposure where the version has them); for a sun W/m2.
 struct LightDescription {
     std::string name;
@@ -32,6 +33,7 @@ struct LightDescription {
     bool use_mis = true;
     std::uint32_t visibility = kVisibleAll;
     std::uint32_t max_bounces = 1024;
+    std::uint32_t program = kNone;  // into SceneDescription::light_programs
 
     bool operator==(const LightDescription&) const = default;
 };

@@ -11,6 +11,8 @@ namespace pharos {
 
 namespace {
 
+constexpr float kFaintest = 0.05f;
+
 bool shines(const EnvironmentLight* environment) {
     return environment != nullptr && average(glm::abs(environment->mean_radiance())) > 0.0f;
 }
@@ -43,14 +45,15 @@ struct LightSampler::Impl {
     }
 
     [[nodiscard]] std::optional<LightSamplerSample> sample_lamp_group(
-        const LightSampleContext& context, const Lamp& lamp, const Vec2& u) const;
+        const LightSampleContext& context, std::uint32_t index, const Vec2& u) const;
     [[nodiscard]] LightHit finish_hit(const LampHit& hit,
                                       std::uint32_t lamp,
                                       const LightSampleContext* context) const;
 };
 
 std::optional<LightSamplerSample> LightSampler::Impl::sample_lamp_group(
-    const LightSampleContext& context, const Lamp& lamp, const Vec2& u) const {
+    const LightSampleContext& context, std::uint32_t index, const Vec2& u) const {
+    const Lamp& lamp = lamps[index];
     const std::optional<LampSample> sampled = sample_lamp(lamp, context, u);
     if (!sampled) {
         return std::nullopt;
@@ -65,6 +68,8 @@ std::optional<LightSamplerSample> LightSampler::Impl::sample_lamp_group(
     result.sample.cast_shadow = lamp.cast_shadow;
     result.sample.visibility = lamp.visibility;
     result.sample.max_bounces = lamp.max_bounces;
+    result.lamp = index;
+    result.program = lamp.program;
     return result;
 }
 
@@ -75,6 +80,8 @@ LightHit LightSampler::Impl::finish_hit(const LampHit& hit,
     result.L = hit.L;
     result.distance = hit.t;
     result.light = lamps[lamp].index;
+    result.lamp = lamp;
+    result.program = lamps[lamp].program;
     result.visibility = lamps[lamp].visibility;
     if (context != nullptr && hit.pdf > 0.0f) {
         result.pdf = hit.pdf * selection.pmf(*context, lamp);
@@ -91,6 +98,10 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
             }
             impl_->lamps.push_back(*lamp);
             bounds.push_back(bound_lamp(*lamp));
+            if (!input.lamp_scales.empty()) {
+                // Never zero: a mean may miss where the lamp shines.
+                bounds.back().strength *= std::max(input.lamp_scales[i], kFaintest);
+            }
         }
     }
     impl_->triangles = EmissiveTriangles(input);
@@ -124,7 +135,7 @@ std::optional<LightSamplerSample> LightSampler::sample(const LightSampleContext&
         return std::nullopt;
     }
     if (choice->group < impl.lamp_count()) {
-        auto result = impl.sample_lamp_group(context, impl.lamps[choice->group], u);
+        auto result = impl.sample_lamp_group(context, choice->group, u);
         if (result) {
             result->sample.pdf *= choice->pmf;
         }
@@ -180,6 +191,13 @@ std::optional<LightHit> LightSampler::sun_hit(std::uint32_t sun,
         return std::nullopt;
     }
     return impl_->finish_hit(*hit, lamp, context);
+}
+
+LampPoint LightSampler::lamp_point(std::uint32_t lamp,
+                                   const Vec3& from,
+                                   const Vec3& wi,
+                                   float distance) const {
+    return pharos::lamp_point(impl_->lamps[lamp], from, wi, distance);
 }
 
 float LightSampler::pdf_environment(const LightSampleContext& context, const Vec3& wi) const {

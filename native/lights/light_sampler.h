@@ -28,6 +28,7 @@ struct EmissiveTriangle {
 
 struct LightSamplerInput {
     std::span<const LightDescription> lamps;
+    std::span<const float> lamp_scales;  // mean emission of the lamps' programs; empty: 1
     std::uint32_t blender_version = 304;
     std::span<const EmissiveTriangle> triangles;
     std::span<const Mesh> meshes;
@@ -43,6 +44,8 @@ struct LightSamplerSample {
     std::uint32_t triangle = 0xffffffffu;
     float u = 0.0f;  // barycentrics on it
     float v = 0.0f;
+    std::uint32_t lamp = 0;               // for lamp_point()
+    std::uint32_t program = 0xffffffffu;  // of the lamp: what it emits multiplies L
 };
 
 class LightSampler {
@@ -68,6 +71,12 @@ class LightSampler {
     [[nodiscard]] std::optional<LightHit> sun_hit(std::uint32_t sun,
                                                   const Vec3& wi,
                                                   const LightSampleContext* context) const;
+
+    // The point of a sampled or hit lamp that lies in direction wi from `from`.
+    [[nodiscard]] LampPoint lamp_point(std::uint32_t lamp,
+                                       const Vec3& from,
+                                       const Vec3& wi,
+                                       float distance) const;
 
     // Density of sampling the world along wi, choice included.
     [[nodiscard]] float pdf_environment(const LightSampleContext& context, const Vec3& wi) const;

@@ -156,6 +156,7 @@ std::optional<Lamp> make_lamp(const LightDescription& d,
     lamp.visibility = d.visibility;
     lamp.max_bounces = d.max_bounces;
     lamp.index = index;
+    lamp.program = d.program;
     lamp.center = Vec3(d.to_world[3]);
     bool shines = is_finite(lamp.center);
     switch (d.type) {

@@ -6,6 +6,7 @@
 #include "materials/bsdf.h"
 
 #include "core/color.h"
+#include "core/visibility.h"
 #include "materials/closure_albedo.h"
 #include "materials/fresnel.h"
 #include "materials/lobes/clearcoat.h"
@@ -218,6 +219,31 @@ BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi) {
     BsdfEval sum;
     for (const Closure& c : bsdf.closures) {
         if (is_delta(c)) {
+            continue;
+        }
+        const BsdfEval e = eval_closure(c, bsdf.wo, wi);
+        sum.f_cos += e.f_cos;
+        if ((glm::dot(c.n, wi) > 0.0f) == in_front) {
+            sum.pdf += c.sample_weight * e.pdf;
+        }
+    }
+    sum.pdf = bsdf.total_sample_weight > 0.0f ? sum.pdf / bsdf.total_sample_weight : 0.0f;
+    return sum;
+}
+
+BsdfEval eval_bsdf_seeing(const Bsdf& bsdf, const Vec3& wi, std::uint32_t visibility) {
+    const bool in_front = glm::dot(wi, bsdf.ng) > 0.0f;
+    BsdfEval sum;
+    for (const Closure& c : bsdf.closures) {
+        if (is_delta(c)) {
+            continue;
+        }
+        // Translucent lobes are diffuse here, as in Cycles.
+        const std::uint8_t lobe = lobe_bits(c, glm::dot(c.n, wi) < 0.0f);
+        const std::uint32_t kind = lobe & kLobeDiffuse        ? kVisibleDiffuse
+                                   : lobe & kLobeTransmission ? kVisibleTransmission
+                                                              : kVisibleGlossy;
+        if ((visibility & kind) == 0) {
             continue;
         }
         const BsdfEval e = eval_closure(c, bsdf.wo, wi);

@@ -40,6 +40,7 @@ enum class FresnelType : std::uint8_t {
     GeneralizedSchlick,  // f0, f90 with the dielectric's shape remapped (cycles-parity 2.6)
     F82Tint,             // f0, b of the F82 model in f90
     PrincipledV1,        // f0 = cspec0, f90 = 1, shape from eta
+    ThinFilm,            // f0; f90 = (index of the film, its thickness in nm, -)
 };
 
 // One lobe. Plain data; a batch holds them contiguously by path.
@@ -102,6 +103,8 @@ struct BsdfTraits {
 };
 
 [[nodiscard]] BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi);
+// Of those lobes alone whose rays may see a light of this visibility (core/visibility.h).
+[[nodiscard]] BsdfEval eval_bsdf_seeing(const Bsdf& bsdf, const Vec3& wi, std::uint32_t visibility);
 [[nodiscard]] std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf,
                                                     float u_closure,
                                                     const Vec2& u);

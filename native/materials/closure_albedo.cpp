@@ -31,6 +31,8 @@ namespace {
         case FresnelType::GeneralizedSchlick:
         case FresnelType::PrincipledV1:
             return lerp(c.f0, c.f90, mean_shape(c, mu));
+        case FresnelType::ThinFilm:
+            return closure_film_reflectance(c, mu);
     }
     return Rgb(1.0f);
 }
@@ -38,6 +40,10 @@ namespace {
 [[nodiscard]] ClosureAlbedo glass_albedo(const Closure& c, float mu) {
     if (c.type == ClosureType::GgxRefraction) {
         return {Rgb(0.0f), c.weight * c.transmission_tint};
+    }
+    if (c.fresnel == FresnelType::ThinFilm) {
+        const FresnelSplit split = closure_fresnel_split(c, mu);
+        return {c.weight * split.reflected, c.weight * split.transmitted};
     }
     const float shape = mean_shape(c, mu);
     const float f = lerp(f0_from_eta(c.eta), 1.0f, shape);

@@ -107,7 +107,7 @@ struct PrincipledV1Inputs {
     Distribution distribution = Distribution::Ggx;
 };
 
-// Principled BSDF of Blender 4.x; fields in operand order. Thin film is not modelled.
+// Principled BSDF of Blender 4.x; fields in operand order.
 struct PrincipledV2Inputs {
     Rgb weight{1.0f};
     Rgb base_color{0.8f};

@@ -12,6 +12,7 @@
 
 #include "core/math.h"
 #include "materials/bsdf.h"
+#include "materials/thin_film.h"
 
 namespace pharos {
 
@@ -72,6 +73,17 @@ struct FresnelSplit {
     Rgb transmitted{0.0f};
 };
 
+// A dielectric under a film. A colour f0 other than the dielectric's own scales what is reflected,
+// the less the nearer that is to everything (as Cycles).
+[[nodiscard]] inline Rgb closure_film_reflectance(const Closure& c, float cosine) {
+    Rgb f = film_reflectance({c.f90.x, c.eta, c.f90.y}, saturate(cosine));
+    const float f0 = f0_from_eta(c.eta);
+    for (int i = 0; i < 3 && f0 > 1e-5f; ++i) {
+        f[i] *= lerp(1.0f, c.f0[i] / f0, saturate((1.0f - f[i]) / (1.0f - f0)));
+    }
+    return f;
+}
+
 // Reflectance of a reflecting closure.
 [[nodiscard]] inline Rgb closure_reflectance(const Closure& c, float cosine) {
     switch (c.fresnel) {
@@ -84,6 +96,8 @@ struct FresnelSplit {
         case FresnelType::GeneralizedSchlick:
         case FresnelType::PrincipledV1:
             return lerp(c.f0, c.f90, dielectric_shape(fresnel_dielectric(cosine, c.eta), c.eta));
+        case FresnelType::ThinFilm:
+            return closure_film_reflectance(c, cosine);
     }
     return Rgb(1.0f);
 }
@@ -98,6 +112,10 @@ struct FresnelSplit {
             return {Rgb(0.0f), total ? Rgb(0.0f) : c.transmission_tint};
         case FresnelType::GeneralizedSchlick: {
             const Rgb r = lerp(c.f0, c.f90, dielectric_shape(f, c.eta));
+            return {r, total ? Rgb(0.0f) : (Rgb(1.0f) - r) * c.transmission_tint};
+        }
+        case FresnelType::ThinFilm: {
+            const Rgb r = closure_film_reflectance(c, cosine);
             return {r, total ? Rgb(0.0f) : (Rgb(1.0f) - r) * c.transmission_tint};
         }
         case FresnelType::PrincipledV1:

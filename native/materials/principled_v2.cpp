@@ -5,6 +5,7 @@
 #include "materials/closure_builder.h"
 #include "materials/closure_setup.h"
 #include "materials/fresnel.h"
+#include "materials/thin_film.h"
 
 namespace pharos {
 
@@ -117,6 +118,16 @@ void add_metal(const PrincipledV2Inputs& in,
     add_closure(c, ctx, sink);
 }
 
+// A film over the closure's dielectric. Seen from inside, indices are relative to it.
+void cover_with_film(Closure& c, const PrincipledV2Inputs& in, bool from_inside) {
+    const float thickness = bounded(in.thin_film_thickness, 0.0f, 1e6f);
+    if (thickness > kThinnestFilm) {
+        const float film = bounded(in.thin_film_ior, 1e-5f, 1e5f);
+        c.fresnel = FresnelType::ThinFilm;
+        c.f90 = Rgb(from_inside ? film * c.eta : film, thickness, 0.0f);
+    }
+}
+
 void add_transmission(const PrincipledV2Inputs& in,
                       const Rgb& weight,
                       const Vec3& normal,
@@ -133,6 +144,7 @@ void add_transmission(const PrincipledV2Inputs& in,
     c.transmission_tint = glm::sqrt(clamp_color(in.base_color));
     set_roughness(c, in.roughness);
     make_singular_without_contrast(c);
+    cover_with_film(c, in, !ctx.front_face);
     if (multi_scatter(in.distribution)) {
         preserve_glass_energy(c, c.transmission_tint, ctx);
     }
@@ -158,7 +170,8 @@ void add_transmission(const PrincipledV2Inputs& in,
         f0 = std::min(2.0f * level * f0, 0.99f);
         c.eta = c.eta < 1.0f ? 1.0f / eta_from_f0(f0) : eta_from_f0(f0);
     }
-    if (c.eta == 1.0f) {
+    cover_with_film(c, in, false);
+    if (c.eta == 1.0f && c.fresnel != FresnelType::ThinFilm) {
         return weight;
     }
     c.f0 = glm::min(f0 * safe_color(in.specular_tint), Rgb(1.0f));

@@ -1,6 +1,7 @@
 // Textures: images in every projection, checker, gradient.
 #include <algorithm>
 
+#include "core/visibility.h"
 #include "materials/program_vm.h"
 
 namespace pharos::detail {
@@ -9,9 +10,25 @@ namespace {
 
 constexpr float kInvTwoPi = 0.5f * kInvPi;
 
-// The texture of an image use, or null: magenta.
-[[nodiscard]] const Texture* find_texture(const Evaluation& e, const ImageUse& use) {
-    return use.image < e.context.textures.size() ? &e.context.textures[use.image] : nullptr;
+// A texture by its number, or null: magenta.
+[[nodiscard]] const Texture* find_texture(const Evaluation& e, std::uint32_t image) {
+    return image < e.context.textures.size() ? &e.context.textures[image] : nullptr;
+}
+
+// The tile that holds a point, or none; its corner is taken from the coordinates.
+[[nodiscard]] std::uint32_t take_tile(const ImageUse& use, float& u, float& v) {
+    constexpr float kAcross = 10.0f;
+    constexpr float kUp = 1000.0f;
+    const float column = std::trunc(u);  // the first tiles reach below zero, as in Cycles
+    const float row = std::trunc(v);
+    if (!(column >= 0.0f && column < kAcross && row >= 0.0f && row < kUp)) {
+        return kNone;
+    }
+    u -= column;
+    v -= row;
+    const auto number = static_cast<std::uint32_t>(kAcross * row + column);
+    const auto tile = std::ranges::find(use.tiles, number, &ImageTile::number);
+    return tile != use.tiles.end() ? tile->image : kNone;
 }
 
 // Where an unconnected vector socket points: one rule for each operation that has one.
@@ -73,7 +90,7 @@ void lookup(const Evaluation& e,
             std::span<const float> v,
             std::span<float> rgba) {
     const ImageUse& use = e.material.program.images[use_index];
-    const Texture* texture = find_texture(e, use);
+    const Texture* texture = find_texture(e, use.image);
     if (texture == nullptr || e.estimate) {
         const Vec4 value = texture != nullptr ? texture->mean() : Texture().mean();
         for (std::size_t i = 0; i < rgba.size(); ++i) {
@@ -83,6 +100,27 @@ void lookup(const Evaluation& e,
     }
     const bool straight = e.material.straight_alpha[use_index] != 0;
     texture->lookup(u, v, {use.interpolation, use.extension, straight}, rgba);
+}
+
+// The same of a tiled image, lane by lane.
+void lookup_tiled(const Evaluation& e,
+                  std::uint16_t use_index,
+                  std::span<const float> uv,
+                  std::span<float> rgba) {
+    const ImageUse& use = e.material.program.images[use_index];
+    const bool straight = e.material.straight_alpha[use_index] != 0;
+    const Texture missing;
+    for (std::size_t i = 0; i < e.lanes; ++i) {
+        float u = uv[i];
+        float v = uv[e.lanes + i];
+        const Texture* texture = find_texture(e, take_tile(use, u, v));
+        float texel[4];
+        (texture != nullptr ? *texture : missing)
+            .lookup({&u, 1}, {&v, 1}, {use.interpolation, use.extension, straight}, texel);
+        for (std::size_t k = 0; k < 4; ++k) {
+            rgba[k * e.lanes + i] = texel[k];
+        }
+    }
 }
 
 // Writes coordinates of every lane into the scratch; u first, then v.
@@ -100,6 +138,10 @@ template <class Function>
 }
 
 void lookup_projected(const Evaluation& e, const NodeOp& op, std::span<const float> uv) {
+    if (!e.material.program.images[op.mode].tiles.empty() && !e.estimate) {
+        lookup_tiled(e, op.mode, uv, std::span<float>(e.output(op), 4 * e.lanes));
+        return;
+    }
     lookup(e,
            op.mode,
            uv.first(e.lanes),

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+
+#include "materials/xyz_color.h"
 
 namespace pharos {
 
@@ -14,24 +17,30 @@ constexpr float kFirstBand = 380.0f;
 constexpr float kBandStep = 20.0f;
 using Spectrum = std::array<float, kBands>;
 
-[[nodiscard]] float lobe(float x, float center, float left, float right) {
-    const float t = (x - center) * (x < center ? left : right);
-    return std::exp(-0.5f * t * t);
-}
+// Colour matching functions of the CIE 1931 standard observer (CIE 015), by band.
+constexpr float kObserver[kBands][3] = {
+    {0.0014f, 0.0000f, 0.0065f}, {0.0143f, 0.0004f, 0.0679f}, {0.1344f, 0.0040f, 0.6456f},
+    {0.3483f, 0.0230f, 1.7471f}, {0.2908f, 0.0600f, 1.6692f}, {0.0956f, 0.1390f, 0.8130f},
+    {0.0049f, 0.3230f, 0.2720f}, {0.0633f, 0.7100f, 0.0782f}, {0.2904f, 0.9540f, 0.0203f},
+    {0.5945f, 0.9950f, 0.0039f}, {0.9163f, 0.8700f, 0.0017f}, {1.0622f, 0.6310f, 0.0008f},
+    {0.8544f, 0.3810f, 0.0002f}, {0.4479f, 0.1750f, 0.0000f}, {0.1649f, 0.0610f, 0.0000f},
+    {0.0468f, 0.0170f, 0.0000f}, {0.0114f, 0.0041f, 0.0000f}, {0.0029f, 0.0010f, 0.0000f},
+    {0.0007f, 0.0002f, 0.0000f}, {0.0002f, 0.0001f, 0.0000f}, {0.0000f, 0.0000f, 0.0000f}};
 
-// Colour matching functions as sums of lobes (Wyman, Sloan, Shirley 2013, equation 4).
-[[nodiscard]] Vec3 matching(float nm) {
-    return Vec3(
-        0.362f * lobe(nm, 442.0f, 0.0624f, 0.0374f) + 1.056f * lobe(nm, 599.8f, 0.0264f, 0.0323f) -
-            0.065f * lobe(nm, 501.1f, 0.0490f, 0.0382f),
-        0.821f * lobe(nm, 568.8f, 0.0213f, 0.0247f) + 0.286f * lobe(nm, 530.9f, 0.0613f, 0.0322f),
-        1.217f * lobe(nm, 437.0f, 0.0845f, 0.0278f) + 0.681f * lobe(nm, 459.0f, 0.0385f, 0.0725f));
-}
+// Cross sections of ozone from 370 nm on, every 10 nm, 1e-27 m^2 (University of Bremen, molecular
+// spectroscopy group, reference spectra of 2011).
+constexpr float kOzoneFrom = 370.0f;
+constexpr float kOzoneStep = 10.0f;
+constexpr float kOzone[] = {
+    0.2182f, 0.2818f, 0.6636f, 1.527f, 2.763f, 5.52f,  8.451f, 15.82f, 23.16f, 36.69f, 49.24f,
+    77.52f,  90.16f,  148.0f,  160.2f, 213.9f, 275.5f, 309.1f, 350.0f, 426.6f, 467.2f, 439.8f,
+    470.1f,  501.9f,  430.5f,  374.0f, 321.5f, 266.2f, 223.8f, 185.2f, 147.3f, 120.9f, 94.23f,
+    74.55f,  65.66f,  51.05f,  41.5f,  42.28f, 32.37f, 24.51f, 28.01f};
 
-[[nodiscard]] Rgb rgb_from_xyz(const Vec3& c) {
-    return Rgb(3.2404542f * c.x - 1.5371385f * c.y - 0.4985314f * c.z,
-               -0.9692660f * c.x + 1.8760108f * c.y + 0.0415560f * c.z,
-               0.0556434f * c.x - 0.2040259f * c.y + 1.0572252f * c.z);
+[[nodiscard]] float ozone_cross_section(float nm) {
+    const float place = (nm - kOzoneFrom) / kOzoneStep;
+    const auto i = static_cast<std::size_t>(place);
+    return lerp(kOzone[i], kOzone[i + 1], place - static_cast<float>(i)) * 1e-27f;
 }
 
 struct Atmosphere {
@@ -41,8 +50,12 @@ struct Atmosphere {
     std::array<Vec3, kBands> eye{};
 };
 
-constexpr double kSunTemperature = 6000.0;
-constexpr double kSunSolidAngle = 6.0e-5;
+constexpr double kSunTemperature = 5778.0;
+constexpr double kSunSolidAngle = 6.773e-5;
+constexpr double kAirIndex = 1.0002926;
+constexpr double kAirMolecules = 2.504e25;   // a m^3, at 20 degrees
+constexpr float kOzoneMolecules = 5.45e18f;  // a m^3 in the middle of 300 Dobson units
+constexpr float kOzoneOffset = 6.0f;         // nm: best agreement with Blender's bands
 constexpr float kEarthRadius = 6360e3f;
 constexpr float kAirRadius = 6420e3f;
 constexpr float kRayleighHeight = 8000.0f;
@@ -55,21 +68,18 @@ constexpr float kMieG = 0.76f;
     Atmosphere a;
     for (std::size_t i = 0; i < kBands; ++i) {
         const float nm = kFirstBand + kBandStep * static_cast<float>(i);
-        // Planck's law; temperature and solid angle are such that the visible part comes closest to
-        // the measured light of the sun (1.9 W / m^2 / nm at 500 nm).
         const double m = static_cast<double>(nm) * 1e-9;
+        // Planck's law.
         const double planck = 1.191043e-16 / (m * m * m * m * m) /
                               (std::exp(1.438777e-2 / (m * kSunTemperature)) - 1.0);
         a.sun[i] = static_cast<float>(planck * kSunSolidAngle * 1e-9);
-        // Rayleigh's law for air of refractive index 1.0002926 and 2.687e25 molecules a m^3.
-        constexpr double kIndex = 1.0002926 * 1.0002926 - 1.0;
+        // Rayleigh's law.
+        constexpr double kContrast = kAirIndex * kAirIndex - 1.0;
         constexpr double kPi3 = 31.00627668;
-        a.rayleigh[i] =
-            static_cast<float>(8.0 * kPi3 * kIndex * kIndex / (3.0 * 2.687e25 * m * m * m * m));
-        // The Chappuis band as one bell.
-        const float t = (nm - 588.0f) / 57.5f;
-        a.ozone[i] = 2.34e-6f * std::exp(-0.5f * t * t);
-        a.eye[i] = matching(nm) * kBandStep;
+        a.rayleigh[i] = static_cast<float>(8.0 * kPi3 * kContrast * kContrast /
+                                           (3.0 * kAirMolecules * m * m * m * m));
+        a.ozone[i] = ozone_cross_section(nm - kOzoneOffset) * kOzoneMolecules;
+        a.eye[i] = Vec3(kObserver[i][0], kObserver[i][1], kObserver[i][2]) * kBandStep;
     }
     return a;
 }
@@ -111,13 +121,32 @@ void add(Densities& sum, const Densities& d, float length) {
     return std::max(glm::length(p) - kEarthRadius, 0.0f);
 }
 
+// Densities on the way out of the air, by Gauss and Laguerre's rule of eight points over a way 25
+// long: they lie close together where the air is dense.
 [[nodiscard]] Densities column(const SkyParameters& in, const Vec3& p, const Vec3& d) {
-    constexpr int kSteps = 16;
-    const float step = way_out(p, d) / kSteps;
+    constexpr float kReach = 25.0f;
+    constexpr float kNode[] = {0.170279632f,
+                               0.903701777f,
+                               2.251086630f,
+                               4.266700170f,
+                               7.045905402f,
+                               10.75851601f,
+                               15.74067864f,
+                               22.86313174f};
+    constexpr float kWeight[] = {0.369188589f,
+                                 0.418786781f,
+                                 0.175794987f,
+                                 0.0333434923f,
+                                 0.00279453624f,
+                                 9.07650877e-5f,
+                                 8.48574672e-7f,
+                                 1.04800117e-9f};
+    const float length = way_out(p, d);
     Densities sum;
-    for (int i = 0; i < kSteps; ++i) {
-        const Vec3 at = p + d * (step * (static_cast<float>(i) + 0.5f));
-        add(sum, densities_at(in, height_of(at)), step);
+    for (std::size_t i = 0; i < std::size(kNode); ++i) {
+        const Vec3 at = p + d * (length * kNode[i] / kReach);
+        const float weight = kWeight[i] * std::exp(kNode[i]) / kReach;
+        add(sum, densities_at(in, height_of(at)), weight * length);
     }
     return sum;
 }
@@ -152,7 +181,7 @@ void add(Densities& sum, const Densities& d, float length) {
     for (int i = 0; i < kSteps; ++i) {
         const Vec3 p = eye + view * (step * (static_cast<float>(i) + 0.5f));
         const Densities here = densities_at(in, height_of(p));
-        add(passed, here, 0.5f * step);
+        add(passed, here, step);
         if (!meets_ground(p, sun)) {
             Densities all = column(in, p, sun);
             add(all, passed, 1.0f);
@@ -162,13 +191,16 @@ void add(Densities& sum, const Densities& d, float length) {
                 sum[band] += air.sun[band] * scattered * transmittance(air, all, band) * step;
             }
         }
-        add(passed, here, 0.5f * step);
     }
     return sum;
 }
 
-constexpr int kElevations = 64;
-constexpr int kAzimuths = 64;  // half the circle: both sides of the sun are alike
+// Blender keeps the dome in a picture of 512 x 128 texels and reads it half a texel beside where it
+// was computed; towards the horizon that is seen, and so done here too. Rows are Blender's; over
+// the azimuth, of which one half is enough, columns lie closer near the sun.
+constexpr int kElevations = 128;
+constexpr int kAzimuths = 96;
+constexpr float kAzimuthShift = kPi / 512.0f;
 
 [[nodiscard]] Vec3 direction_of(float elevation, float rotation) {
     return Vec3(std::sin(rotation) * std::cos(elevation),
@@ -270,10 +302,11 @@ void SkyModel::prepare_scattering() {
     const Vec3 sun = direction_of(in_.elevation, 0.0f);
     dome_.resize(kElevations * kAzimuths);
     for (int y = 0; y < kElevations; ++y) {
-        const float t = static_cast<float>(y) / (kElevations - 1);
+        const float t = static_cast<float>(y) / kElevations;
         for (int x = 0; x < kAzimuths; ++x) {
-            const float azimuth = kPi * static_cast<float>(x) / (kAzimuths - 1);
-            const Vec3 view = direction_of(0.5f * kPi * t * t, azimuth);
+            const float azimuth = kPi * sqr(static_cast<float>(x) / (kAzimuths - 1));
+            const float shifted = std::min(azimuth + kAzimuthShift, kPi);
+            const Vec3 view = direction_of(0.5f * kPi * t * t, shifted);
             dome_[static_cast<std::size_t>(y * kAzimuths + x)] =
                 to_rgb(air, single_scattering(air, in_, eye, view, sun));
         }
@@ -312,10 +345,12 @@ Rgb SkyModel::scattered(const Vec3& direction) const {
         const float t = saturate((elevation - in_.elevation) / in_.sun_size + 0.5f);
         return lerp(disc_low_, disc_high_, t) * limb;
     }
-    const float v = std::sqrt(std::max(elevation, 0.0f) / (0.5f * kPi)) * (kElevations - 1);
+    const float row_place =
+        std::sqrt(std::max(elevation, 0.0f) / (0.5f * kPi)) * kElevations - 0.5f;
+    const float v = std::clamp(row_place, 0.0f, static_cast<float>(kElevations - 1));
     const float turn = std::atan2(direction.x, direction.y) - in_.rotation;
     const float around = std::abs(std::remainder(turn, 2.0f * kPi));
-    const float u = around / kPi * (kAzimuths - 1);
+    const float u = std::sqrt(around / kPi) * (kAzimuths - 1);
     const int x = std::min(static_cast<int>(u), kAzimuths - 2);
     const int y = std::min(static_cast<int>(v), kElevations - 2);
     const Rgb* row = &dome_[static_cast<std::size_t>(y * kAzimuths + x)];

@@ -3,7 +3,7 @@
 // wavelengths and stored by direction.
 //
 // z is up. The sun stands at `elevation` above the horizon and `rotation` from +y towards +x. Solar
-// light is that of a black body of 6000 K, colours those of Wyman, Sloan, Shirley 2013.
+// light is that of a black body of 5778 K.
 #pragma once
 
 #include <vector>

@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "film/passes.h"
 #include "image/image_io.h"
+#include "scene/displace.h"
 #include "scene/mend.h"
 #include "scene/scene.h"
 #include "scene/scene_build.h"
@@ -48,6 +49,11 @@ class SceneBuild {
         poll();
         compile_materials();
         make_shading_context();
+        if (displace_meshes(*scene_, cancel_)) {
+            make_shading_context();
+            scene_->surfaces = make_instance_surfaces(
+                scene_->description.meshes, scene_->instances, pieces_ != nullptr);
+        }
         poll();
         scene_->accelerator =
             std::make_unique<Accelerator>(scene_->description.meshes,
@@ -143,16 +149,26 @@ std::vector<bool> SceneBuild::images_to_load() {
     SceneDescription& d = scene_->description;
     std::vector<bool> wanted(d.images.size());
     const auto mark = [&](const NodeProgram& program) {
+        const auto mark_one = [&](std::uint32_t image) {
+            if (image < wanted.size()) {
+                wanted[image] = true;
+            }
+        };
         for (const ImageUse& use : program.images) {
-            if (use.image < wanted.size()) {
-                wanted[use.image] = true;
+            mark_one(use.image);
+            for (const ImageTile& tile : use.tiles) {
+                mark_one(tile.image);
             }
         }
     };
     for (const MaterialDescription& material : d.materials) {
         mark(material.program);
+        mark(material.displacement);
     }
     mark(d.world.program);
+    for (const NodeProgram& program : d.light_programs) {
+        mark(program);
+    }
     for (std::size_t i = 0; i < d.images.size(); ++i) {
         const bool known = pieces_ != nullptr && pieces_->give_image(*scene_, i, report_);
         wanted[i] = wanted[i] && !known;
@@ -192,10 +208,20 @@ void SceneBuild::compile_materials() {
         scene_->materials.push_back(compile_material(
             material.name, std::move(material.program), report_, scene_->textures));
         scene_->materials.back().emission_sampling = material.emission_sampling;
+        scene_->displacements.emplace_back();
+        if (!material.displacement.ops.empty()) {
+            scene_->displacements.back() = compile_material(
+                material.name, std::move(material.displacement), report_, scene_->textures);
+        }
     }
+    scene_->displacements.emplace_back();
     scene_->materials.push_back(compile_material("Default", default_program(), report_));
     scene_->world =
         compile_material("World", std::move(d.world.program), report_, scene_->textures);
+    for (NodeProgram& program : d.light_programs) {
+        scene_->lamp_materials.push_back(
+            compile_material("Light", std::move(program), report_, scene_->textures));
+    }
 }
 
 void SceneBuild::make_shading_context() {
@@ -220,6 +246,11 @@ void SceneBuild::find_needs() {
     SceneNeeds& needs = scene_->needs;
     needs.textures = needs.environment && scene_->world.textured;
     needs.light_path = needs.environment && scene_->world.asks_path;
+    needs.lamp_programs = !scene_->lamp_materials.empty();
+    for (const Material& material : scene_->lamp_materials) {
+        needs.textures = needs.textures || material.textured;
+        needs.light_path = needs.light_path || material.asks_path;
+    }
     needs.all_constant = true;
     for (std::size_t i = 0; i < used.size(); ++i) {
         const Material& material = scene_->materials[i];

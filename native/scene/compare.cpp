@@ -44,6 +44,7 @@ SceneDescription outline(const SceneDescription& description) {
         known.path = image.path;
     }
     out.lights = description.lights;
+    out.light_programs = description.light_programs;
     out.world = description.world;
     out.has_camera = description.has_camera;
     out.camera = description.camera;
@@ -59,7 +60,8 @@ bool same_content(const SceneDescription& a, const SceneDescription& b) {
            std::ranges::equal(a.meshes, b.meshes, same_mesh) && a.materials == b.materials &&
            a.material_sets == b.material_sets && a.instances == b.instances &&
            std::ranges::equal(a.images, b.images, same_image) && a.lights == b.lights &&
-           a.world == b.world && same_settings(a.settings, b.settings) && a.passes == b.passes &&
+           a.light_programs == b.light_programs && a.world == b.world &&
+           same_settings(a.settings, b.settings) && a.passes == b.passes &&
            a.instance_attributes == b.instance_attributes;
 }
 

@@ -129,8 +129,11 @@ void fields(Archive& archive, DumpValue<Archive, NodeProgram>& value) {
 
 template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, MaterialDescription>& value) {
-    auto& [name, program, emission_sampling] = value;
+    auto& [name, program, emission_sampling, displacement] = value;
     archive(name, program, emission_sampling);
+    if (archive.version() >= 4) {
+        archive(displacement);
+    }
 }
 
 template <class Archive>
@@ -167,9 +170,13 @@ void fields(Archive& archive, DumpValue<Archive, LightDescription>& value) {
            cast_shadow,
            use_mis,
            visibility,
-           max_bounces] = value;
+           max_bounces,
+           program] = value;
     archive(name, type, to_world, strength, radius, spot_angle, spot_blend, shape, size_u, size_v);
     archive(spread, angle, soft_falloff, normalize, cast_shadow, use_mis, visibility, max_bounces);
+    if (archive.version() >= 4) {
+        archive(program);
+    }
 }
 
 template <class Archive>
@@ -255,6 +262,7 @@ void fields(Archive& archive, DumpValue<Archive, SceneDescription>& value) {
            instances,
            images,
            lights,
+           light_programs,
            world,
            has_camera,
            camera,
@@ -269,6 +277,9 @@ void fields(Archive& archive, DumpValue<Archive, SceneDescription>& value) {
     }
     if (archive.version() >= 3) {
         archive(instance_attributes);
+    }
+    if (archive.version() >= 4) {
+        archive(light_programs);
     }
 }
 

@@ -27,9 +27,10 @@ struct SceneNeeds {
     bool constant_environment = false;
     bool transparency = false;  // some material lets shadow rays through
     bool textures = false;
-    bool light_path = false;    // some program asks how a path came
-    bool all_constant = false;  // no material runs a node program
-    bool nee = false;           // there is something to sample
+    bool lamp_programs = false;  // some lamp does not shine alike everywhere
+    bool light_path = false;     // some program asks how a path came
+    bool all_constant = false;   // no material runs a node program
+    bool nee = false;            // there is something to sample
 };
 
 struct Scene {
@@ -39,8 +40,10 @@ struct Scene {
     std::vector<Bounds3> mesh_bounds;       // object space
     std::vector<std::uint32_t> pass_index;  // of each instance; empty: not asked for
     std::vector<Material> materials;        // one per description.materials, then the grey default
+    std::vector<Material> displacements;    // of each material; without operations: none
     std::vector<Texture> textures;
     Material world;
+    std::vector<Material> lamp_materials;  // one per description.light_programs
     Rgb constant_world{0.0f};
     std::unique_ptr<EnvironmentLight> environment;
     std::unique_ptr<LightSampler> lights;

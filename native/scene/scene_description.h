@@ -32,10 +32,15 @@ struct InstanceDescription {
     bool operator==(const InstanceDescription&) const = default;
 };
 
+inline constexpr std::uint16_t kDisplaceInWorld = 1;  // else in the object's space
+
 struct MaterialDescription {
     std::string name;
     NodeProgram program;
     bool emission_sampling = true;  // next-event estimation towards emissive triangles
+    // Moves vertices: AovValue along the normal, AovColor by a vector; mode is 0 or
+    // kDisplaceInWorld. Empty: none moves.
+    NodeProgram displacement;
 
     bool operator==(const MaterialDescription&) const = default;
 };
@@ -96,6 +101,7 @@ struct SceneDescription {
     std::vector<InstanceDescription> instances;
     std::vector<ImageDescription> images;
     std::vector<LightDescription> lights;
+    std::vector<NodeProgram> light_programs;  // of lamps that do not shine alike everywhere
     WorldDescription world;
     bool has_camera = false;
     CameraDescription camera;

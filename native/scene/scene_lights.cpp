@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/color.h"
+
 namespace pharos {
 
 namespace {
@@ -58,8 +60,17 @@ void prepare_lights(Scene& scene, const CancelFlag& cancel) {
         collect_emitters(scene, i, cancel, emitters);
     }
     scene.needs.emissive_triangles = !emitters.empty();
+    std::vector<float> scales;
+    for (LightDescription& lamp : scene.description.lights) {
+        const bool has_program = lamp.program < scene.lamp_materials.size();
+        lamp.program = has_program ? lamp.program : kNone;
+        scales.push_back(
+            has_program ? average(glm::abs(scene.lamp_materials[lamp.program].emission_estimate))
+                        : 1.0f);
+    }
     LightSamplerInput input;
     input.lamps = scene.description.lights;
+    input.lamp_scales = scales;
     input.blender_version = scene.description.blender_version;
     input.triangles = emitters;
     input.meshes = scene.description.meshes;

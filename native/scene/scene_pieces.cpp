@@ -1,5 +1,6 @@
 #include "scene/scene_pieces.h"
 
+#include <algorithm>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -38,13 +39,18 @@ std::optional<WorldKey> world_key(const SceneDescription& description) {
     if (asks_view(key.world.program)) {
         return std::nullopt;
     }
+    const auto add_image = [&](std::uint32_t image) {
+        key.image_versions.push_back(
+            image < description.images.size() ? description.images[image].version : 0);
+    };
     for (const ImageUse& use : key.world.program.images) {
-        const std::uint64_t version =
-            use.image < description.images.size() ? description.images[use.image].version : 0;
-        if (version == 0) {
-            return std::nullopt;
+        add_image(use.image);
+        for (const ImageTile& tile : use.tiles) {
+            add_image(tile.image);
         }
-        key.image_versions.push_back(version);
+    }
+    if (std::ranges::find(key.image_versions, 0u) != key.image_versions.end()) {
+        return std::nullopt;
     }
     return key;
 }

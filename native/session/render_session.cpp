@@ -257,7 +257,9 @@ void RenderSession::Impl::resume(const Scene& scene, const CheckpointKeeper& kee
             throw;
         }
         note(Severity::Info, "Checkpoint", std::string("Rendered anew: ") + error.what());
-        work.film.film = Film(scene.description.film, PassLayout(scene.description.passes.wanted));
+        work.film.film =
+            Film(scene.description.film,
+                 PassLayout(scene.description.passes.wanted, scene.description.passes.aovs));
         work.guide = make_guide(scene);
         work.position = {};
     }

@@ -30,6 +30,11 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
+def covers(kind: str) -> None:
+    """One more mode of a node has been compared with Cycles: run_all.py counts."""
+    say(f"COVERS {kind}")
+
+
 def enable_addon():
     addon_utils = importlib.import_module("addon_utils")  # on the path once bpy is there
     addon_utils.enable("pharos", default_set=False)

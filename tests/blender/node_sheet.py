@@ -87,7 +87,9 @@ def _mesh(materials, values: np.ndarray):
 def _material(case: Case):
     owner = harness.material(case.name)
     emitter = harness.node(owner, "ShaderNodeEmission", Strength=1.0)
-    harness.connect(owner, case.build(owner), emitter.inputs[0])
+    output = case.build(owner)
+    harness.covers(output.node.bl_idname)
+    harness.connect(owner, output, emitter.inputs[0])
     harness.connect(owner, emitter.outputs[0], harness.surface(owner))
     return owner
 

@@ -25,6 +25,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+COVERED: dict[str, list[str]] = {}  # by host: the node of each mode compared with Cycles
 TIMEOUT = int(os.environ.get("PHAROS_TEST_TIMEOUT", "300"))
 
 
@@ -95,6 +96,7 @@ def run(host: str, script: Path, env: dict[str, str]) -> tuple[int, int, int]:
     ]
     broken = (code != 0 and not counts[1]) or not any(counts)
     lines = re.findall(r"^(?:FAIL|SKIP|MEASURED) .*$", text, re.MULTILINE)
+    COVERED.setdefault(host, []).extend(re.findall(r"^COVERS (\S+)", text, re.MULTILINE))
     if broken:
         counts[1] += 1
         last = text.strip().splitlines()[-1:] or ["it said nothing"]
@@ -126,6 +128,9 @@ def main() -> int:
                 continue
             for i, count in enumerate(run(host, script, env)):
                 totals[i] += count
+    for host, modes in COVERED.items():
+        if modes:
+            say(f"{host}: {len(set(modes))} nodes compared with Cycles in {len(modes)} modes")
     say(f"{totals[0]} passed, {totals[1]} failed, {totals[2]} skipped")
     return 1 if totals[1] or not totals[0] else 0
 

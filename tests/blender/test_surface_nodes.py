@@ -53,6 +53,10 @@ def _prepared(samples: int = 64):
 
 
 def _compare(tolerance: float = 0.02, least_range: float = 0.05) -> None:
+    for tree in (owner.node_tree for owner in bpy.data.materials if owner.node_tree):
+        for link in tree.links:
+            if link.to_node.bl_idname == "ShaderNodeEmission":
+                harness.covers(link.from_node.bl_idname)
     pictures = []
     for engine in ("CYCLES", "PHAROS"):
         bpy.context.scene.render.engine = engine

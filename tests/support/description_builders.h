@@ -417,7 +417,7 @@ struct PrincipledInputs {
 class SceneBuilder {
   public:
     std::uint32_t material(std::string name, NodeProgram program, bool emission_sampling = true) {
-        d_.materials.push_back({std::move(name), std::move(program), emission_sampling});
+        d_.materials.push_back({std::move(name), std::move(program), emission_sampling, {}});
         return static_cast<std::uint32_t>(d_.materials.size() - 1);
     }
 

@@ -72,7 +72,7 @@ class InstanceExporter:
 
     def _add_light(self, instance) -> None:
         obj = instance.object
-        fields = light_fields(self._native, self._context.images, obj.data, self._context.report)
+        fields = light_fields(self._context, obj.data, instance.matrix_world)
         if fields is not None:
             self._context.description.add_light(
                 name=obj.name,

@@ -10,15 +10,18 @@ from .nodes import flatten_light
 _TYPES = {"POINT": "Point", "SPOT": "Spot", "AREA": "Area", "SUN": "Sun"}
 
 
-def node_factor(native, images, light, report) -> np.ndarray:
-    """What a lamp's node tree multiplies its strength with."""
+def _node_fields(context, light, matrix) -> dict:
+    """What a lamp's node tree multiplies its strength with: numbers, or a program."""
+    strength = compat.light_strength(light)
     if not light.use_nodes or light.node_tree is None:
-        return np.ones(3)
-    program = flatten_light(native, images, report, light).program
+        return {"strength": strength.tolist()}
+    native = context.native
+    program = flatten_light(native, context.images, context.report, light, matrix).program
     *factor, constant = native.mean_emission(program)
-    if not constant:
-        report.warn(light.name, "The light's nodes vary over it; their mean is used.")
-    return np.array(factor, np.float64)
+    if constant:
+        return {"strength": (strength * np.array(factor, np.float64)).tolist()}
+    index = context.description.add_light_program(program)
+    return {"strength": strength.tolist(), "program": index}
 
 
 def _shape_fields(native, light) -> dict:
@@ -42,18 +45,18 @@ def _shape_fields(native, light) -> dict:
     return fields
 
 
-def light_fields(native, images, light, report) -> dict | None:
+def light_fields(context, light, matrix) -> dict | None:
     """Arguments of add_light but for name, place and visibility; None: emits nothing itself."""
+    native, report = context.native, context.report
     cycles = getattr(light, "cycles", None)
     if light.type == "AREA" and getattr(cycles, "is_portal", False):
         report.info(light.name, "Light portals are not used.")
         return None
     if light.type == "SPOT" and light.use_square:
         report.info(light.name, "Spot lights are round.")
-    strength = compat.light_strength(light) * node_factor(native, images, light, report)
     return {
         "type": getattr(native.LightType, _TYPES[light.type]),
-        "strength": strength.tolist(),
+        **_node_fields(context, light, matrix),
         "normalize": getattr(light, "normalize", True),
         "cast_shadow": compat.light_casts_shadow(light),
         "use_mis": getattr(cycles, "use_multiple_importance_sampling", True),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .. import compat
-from .nodes import Flattened, flatten_material
+from .nodes import Flattened, flatten_displacement, flatten_material
 
 
 class MaterialSet(NamedTuple):
@@ -15,6 +15,18 @@ class MaterialSet(NamedTuple):
     uses_uv: bool
     mesh_attributes: frozenset
     instance_attributes: frozenset
+
+
+def _needs_of(flat: Flattened, moves: Flattened | None) -> Flattened:
+    """What a material's two programs read."""
+    if moves is None:
+        return flat._replace(program=None)
+    return Flattened(
+        None,
+        flat.uses_uv or moves.uses_uv,
+        flat.mesh_attributes | moves.mesh_attributes,
+        flat.instance_attributes | moves.instance_attributes,
+    )
 
 
 class MaterialTable:
@@ -41,12 +53,14 @@ class MaterialTable:
             flat = flatten_material(
                 self._native, self._images, self._report, material, self._aovs
             )
+            moves = flatten_displacement(self._native, self._images, self._report, material)
             index = self._description.add_material(
                 name=material.name,
                 program=flat.program,
                 emission_sampling=compat.material_samples_emission(material),
+                displacement=moves and moves.program,
             )
-            self._materials[key] = index, flat._replace(program=None)
+            self._materials[key] = index, _needs_of(flat, moves)
             self.pass_indices.append(material.pass_index)
         return self._materials[key]
 

@@ -5,6 +5,7 @@ node_values.
 from __future__ import annotations
 
 from .attributes import INSTANCER, OBJECT, OBJECT_INFO
+from .lamp_nodes import lamp_coordinate, lamp_geometry
 
 
 def camel(name: str) -> str:
@@ -13,10 +14,15 @@ def camel(name: str) -> str:
 
 
 def uv(f, name: str = ""):
+    if f.lamp is not None:
+        return lamp_coordinate(f, f.lamp, "UV")
     return f.program.op("Uv", [], 3, f.program.name_index(name))
 
 
 def coordinate(f, name: str):
+    of_lamp = lamp_coordinate(f, f.lamp, name) if f.lamp is not None else None
+    if of_lamp is not None:
+        return of_lamp
     return f.program.op("Coordinate", [], 3, f.native.CoordinateOutput[name])
 
 
@@ -59,6 +65,9 @@ def _geometry(f, node, scope, socket):
     size = _GEOMETRY.get(socket.identifier)
     if size is None:
         return None
+    of_lamp = lamp_geometry(f, f.lamp, socket.identifier) if f.lamp is not None else None
+    if of_lamp is not None:
+        return of_lamp
     if socket.identifier == "Normal":
         return surface_normal(f)
     mode = f.native.GeometryOutput[socket.identifier.replace(" ", "")]

@@ -6,8 +6,11 @@ from .node_coordinates import camel, direction, uv, vector_or
 
 
 def _image_use(f, node, projection: str) -> int:
+    # A box is looked at through the first tile alone, as in Cycles.
+    tiles = f.images.tiles(node.image, node.image_user) if projection != "BOX" else []
     return f.program.add_image_use(
-        image=f.images.index(node.image, node.image_user),
+        image=tiles[0].image if tiles else f.images.index(node.image, node.image_user),
+        tiles=tiles,
         interpolation=getattr(f.native.ImageInterpolation, camel(node.interpolation)),
         extension=_extension(f, node),
         projection=getattr(f.native.ImageProjection, camel(projection)),
@@ -56,8 +59,8 @@ def _sky(f, node, scope, socket):
     kind = node.sky_type
     if kind == "HOSEK_WILKIE":
         f.unsupported(node, "the sky of Hosek and Wilkie (that of Preetham is shown)")
-    elif kind not in _SKIES:
-        f.report.info(f.owner, "The scattered sky has spectra of its own: near Cycles', not equal.")
+    elif kind not in _SKIES and f.version >= 500:
+        f.report.info(f.owner, "The scattered sky is that of Blender 4.")
     vector = vector_or(f, node, scope, lambda: direction(f))
     single = kind not in _SKIES
     # Dust became aerosols in Blender 5.

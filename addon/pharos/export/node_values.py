@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .lamp_nodes import light_falloff
 from .node_coordinates import COORDINATES, camel, surface_normal, uv
 from .node_images import IMAGES
 from .node_textures import TEXTURES
@@ -315,13 +316,6 @@ def _absent(*values: float):
     return handler
 
 
-def _light_falloff(f, node, scope, socket):
-    """Light falls off with the square of the distance, as it does by itself."""
-    if socket.identifier != "Quadratic":
-        f.unsupported(node, f"output {socket.name!r}")
-    return f.input(node, scope, "Strength", 1)
-
-
 VALUES = {
     **COORDINATES,
     **IMAGES,
@@ -372,5 +366,5 @@ VALUES = {
     "ShaderNodeParticleInfo": _absent(),
     "ShaderNodePointInfo": _absent(),
     "ShaderNodeVolumeInfo": _absent(),
-    "ShaderNodeLightFalloff": _light_falloff,
+    "ShaderNodeLightFalloff": light_falloff,
 }

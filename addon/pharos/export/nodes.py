@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .. import compat
+from .lamp_nodes import LampSpace
 from .node_closures import CLOSURES
 from .node_values import VALUES, bumped_normal, displaced_height
 from .program import ProgramBuilder, Value
@@ -38,7 +39,8 @@ class Flattener:
         self.is_world = is_world
         self.version = compat.version_number()
         self.material_index = 0
-        self.moves_surface = False
+        self.tilts_normal = True  # whether displacement does, as bump mapping
+        self.lamp = None  # LampSpace of a lamp's tree
         self.aovs: dict[tuple[str, bool], int] = {}  # passes by name and whether they are colours
         self.program = ProgramBuilder(native)
         self.image_values: dict[tuple, Value] = {}  # image nodes: colour and alpha at once
@@ -173,11 +175,13 @@ class Flattener:
 
     def _displace(self, source: Source) -> None:
         """Displacement tilts the normal that all closures start from."""
+        if source.node.bl_idname == "ShaderNodeVectorDisplacement" and not self.tilts_normal:
+            return
         if displaced_height(self, source) is None:
             self.unsupported(source.node, "displacement by it")
             return
-        if self.moves_surface:
-            self.warn("True displacement is not supported; it is shown as bump mapping.")
+        if not self.tilts_normal:
+            return
         one = self.program.constant(1.0)
         width = 1.0 if self.version < 400 else 0.1
         self.program.default_normal = bumped_normal(
@@ -201,7 +205,7 @@ def flatten_material(native, images, report, material, aovs=()) -> Flattened:
     flattener = Flattener(native, images, report, material.name)
     flattener.aovs = dict(aovs)
     flattener.material_index = material.pass_index
-    flattener.moves_surface = compat.displacement_method(material) != "BUMP"
+    flattener.tilts_normal = compat.displacement_method(material) == "BUMP"
     if material.use_nodes and material.node_tree is not None:
         return flattener.flatten(material.node_tree)
     program = flattener.program
@@ -217,8 +221,49 @@ def flatten_material(native, images, report, material, aovs=()) -> Flattened:
     return flattener.result()
 
 
-def flatten_light(native, images, report, light) -> Flattened:
-    return Flattener(native, images, report, light.name).flatten(light.node_tree)
+def _vector_moved(f, node, scope):
+    """The vector of a Vector Displacement node; None in tangent space."""
+    if node.space == "TANGENT":
+        f.unsupported(node, "displacement in tangent space")
+        return None
+    program = f.program
+    middle = program.to_vector(f.input(node, scope, "Midlevel", 1))
+    above = program.vector_math("Subtract", f.input(node, scope, "Vector", 3), middle)
+    scale = program.to_vector(f.input(node, scope, "Scale", 1))
+    return program.vector_math("Multiply", above, scale)
+
+
+def flatten_displacement(native, images, report, material) -> Flattened | None:
+    """How a material moves vertices; None where it does not."""
+    moves = compat.displacement_method(material) != "BUMP"
+    if not moves or not material.use_nodes or material.node_tree is None:
+        return None
+    output = material.node_tree.get_output_node("CYCLES")
+    scope = Scope(material.node_tree)
+    flattener = Flattener(native, images, report, material.name)
+    if output is None or not flattener.linked(output, scope, "Displacement"):
+        return None
+    source = resolve(input_by_identifier(output, "Displacement"), scope)
+    node = source.node
+    if node.bl_idname == "ShaderNodeDisplacement":
+        if flattener.linked(node, source.scope, "Normal"):
+            flattener.unsupported(node, "a normal of its own")
+        code, value = "AovValue", displaced_height(flattener, source)
+    elif node.bl_idname == "ShaderNodeVectorDisplacement":
+        code, value = "AovColor", _vector_moved(flattener, node, source.scope)
+    else:
+        return None  # flatten_material() names it
+    if value is None:
+        return None
+    mode = native.DISPLACE_IN_WORLD if node.space == "WORLD" else 0
+    flattener.program.closure(code, [value], mode)
+    return flattener.result()
+
+
+def flatten_light(native, images, report, light, matrix) -> Flattened:
+    flattener = Flattener(native, images, report, light.name)
+    flattener.lamp = LampSpace(light, matrix)
+    return flattener.flatten(light.node_tree)
 
 
 def flatten_world(native, images, report, world, aovs=()) -> Flattened:

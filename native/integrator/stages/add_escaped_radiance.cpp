@@ -29,7 +29,8 @@ void add_world(const RenderContext& context, PathBatch& batch) {
     for (std::size_t k = 0; k < count; ++k) {
         const std::uint32_t i = batch.escaped[k];
         const std::uint32_t path = batch.active[i];
-        if (!(scene.description.world.visibility & batch.visibility[i]) ||
+        if (!sees_light(
+                batch.counters[path], batch.visibility[i], scene.description.world.visibility) ||
             (batch.counters[path].from_camera && scene.description.film.transparent)) {
             continue;
         }
@@ -51,8 +52,8 @@ void add_suns(const RenderContext& context, PathBatch& batch) {
         for (std::uint32_t sun = 0; sun < lights.sun_count(); ++sun) {
             const auto hit =
                 lights.sun_hit(sun, batch.rays[i].direction, rival_context(batch, path));
-            if (hit && (hit->visibility & batch.visibility[i])) {
-                add_chance_hit(context, batch, path, hit->L, hit->pdf);
+            if (hit && sees_light(batch.counters[path], batch.visibility[i], hit->visibility)) {
+                add_lamp_hit(context, batch, path, batch.rays[i], *hit);
             }
         }
     }

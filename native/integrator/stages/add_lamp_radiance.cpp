@@ -28,8 +28,8 @@ std::uint64_t add_lamp_radiance(const RenderContext& context, PathBatch& batch) 
             if (!hit) {
                 break;
             }
-            if (hit->visibility & batch.visibility[i]) {
-                add_chance_hit(context, batch, path, hit->L, hit->pdf);
+            if (sees_light(batch.counters[path], batch.visibility[i], hit->visibility)) {
+                add_lamp_hit(context, batch, path, ray, *hit);
             }
             ray.t_min = std::nextafter(hit->distance, kInfinity);
         }

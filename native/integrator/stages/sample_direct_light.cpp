@@ -38,6 +38,14 @@ void note_light_sample(const Guide& guide,
     }
 }
 
+[[nodiscard]] std::uint32_t visibility_of(const Scene& scene, const LightSamplerSample& light) {
+    if (light.environment) {
+        return scene.description.world.visibility;
+    }
+    return light.instance != kNone ? scene.instances[light.instance].visibility
+                                   : light.sample.visibility;
+}
+
 struct Receiver {
     std::size_t surface = 0;
     std::uint32_t path = 0;
@@ -60,7 +68,10 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
         return;
     }
     const LightSample& sample = light->sample;
-    const BsdfEval scattering = eval_bsdf(bsdf, sample.wi);
+    const std::uint32_t visibility = visibility_of(scene, *light);
+    const BsdfEval scattering = (visibility & kVisibleByLobe) == kVisibleByLobe
+                                    ? eval_bsdf(bsdf, sample.wi)
+                                    : eval_bsdf_seeing(bsdf, sample.wi, visibility);
     if (is_zero(scattering.f_cos)) {
         return;
     }
@@ -88,6 +99,13 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
         L = Rgb(1.0f);
         batch.pending_triangles.push_back(
             {point_on_emitter(scene, *light, ray), sample.wi, shadow});
+    } else if (light->program != kNone) {
+        const LampPoint point =
+            scene.lights->lamp_point(light->lamp, surface.p, sample.wi, sample.distance);
+        batch.pending_lamps.push_back(
+            {lamp_interaction(point, sample.wi, sample.distance, light->program),
+             sample.wi,
+             shadow});
     }
     const std::uint32_t record =
         batch.guides.empty() ? kNone : batch.vertex_record[receiver.surface];
@@ -105,10 +123,12 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
     return light_path_info(batch.counters[batch.shadow_rays[pending.shadow].path], false);
 }
 
-// Radiance of the sampled emissive triangles, by material.
-void evaluate_pending_triangles(const RenderContext& context, PathBatch& batch) {
+// Radiance of the sampled emissive triangles, or lamps with nodes, by material.
+void evaluate_pending_emitters(const RenderContext& context,
+                               std::span<const Material> materials,
+                               std::vector<PendingLight>& pending,
+                               PathBatch& batch) {
     const Scene& scene = context.scene;
-    auto& pending = batch.pending_triangles;
     std::ranges::stable_sort(pending, {}, [](const PendingLight& p) { return p.emitter.material; });
     for (std::size_t begin = 0; begin < pending.size();) {
         const std::uint32_t material = pending[begin].emitter.material;
@@ -122,7 +142,7 @@ void evaluate_pending_triangles(const RenderContext& context, PathBatch& batch) 
             shading_with_paths(scene, end - begin, batch.path_infos, [&](std::size_t i) {
                 return asking_path(batch, pending[begin + i]);
             });
-        evaluate_emission(scene.materials[material],
+        evaluate_emission(materials[material],
                           shading,
                           batch.pending_surfaces,
                           batch.scratch,
@@ -161,6 +181,7 @@ std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch
         return 0;
     }
     batch.pending_triangles.clear();
+    batch.pending_lamps.clear();
     batch.pending_worlds.clear();
     std::uint64_t items = 0;
     for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
@@ -173,7 +194,11 @@ std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch
         }
     }
     if (!batch.pending_triangles.empty()) {
-        evaluate_pending_triangles(context, batch);
+        evaluate_pending_emitters(context, context.scene.materials, batch.pending_triangles, batch);
+    }
+    if (!batch.pending_lamps.empty()) {
+        evaluate_pending_emitters(
+            context, context.scene.lamp_materials, batch.pending_lamps, batch);
     }
     if (!batch.pending_worlds.empty()) {
         evaluate_pending_worlds(context, batch);

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <numeric>
+
 #include "core/color.h"
 #include "geometry/ray_offset.h"
 #include "integrator/mis.h"
@@ -29,33 +32,73 @@ void trace_opaque(const RenderContext& context, PathBatch& batch) {
     }
 }
 
-// One surface along each remaining shadow ray: contributions are multiplied by its transmittance
-// and the ray goes on behind it; opaque surfaces end it. Rays that leave add what they carry.
-void pass_one_surface(const RenderContext& context, PathBatch& batch) {
+// The surfaces that shadow rays have met, where something may come through; rays that left add what
+// they carry.
+void collect_transparent(const RenderContext& context, PathBatch& batch) {
     const Scene& scene = context.scene;
-    const ShadingContext shading =
-        shading_with_paths(scene, 1, batch.path_infos, [](std::size_t) { return PathInfo(); });
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < batch.shadow_rays.size(); ++i) {
+    batch.shadow_surfaces.clear();
+    batch.shadow_places.clear();
+    for (std::uint32_t i = 0; i < batch.shadow_rays.size(); ++i) {
         const Hit& hit = batch.hits[i];
         if (hit.instance == kNone) {
             add_contribution(batch, batch.shadow_rays[i]);
             continue;
         }
+        const SurfaceInteraction surface = scene.interaction(batch.shadow_queries[i], hit);
+        if (scene.materials[surface.material].transparent) {
+            batch.shadow_surfaces.push_back(surface);
+            batch.shadow_places.push_back(i);
+        }
+    }
+}
+
+// Transmittance of the collected surfaces, material by material.
+void evaluate_transmittances(const RenderContext& context, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    const std::size_t count = batch.shadow_surfaces.size();
+    const auto material_of = [&](std::uint32_t k) { return batch.shadow_surfaces[k].material; };
+    std::vector<std::uint32_t>& order = batch.shadow_order;
+    order.resize(count);
+    std::iota(order.begin(), order.end(), 0u);
+    std::ranges::stable_sort(order, {}, material_of);
+    batch.transmittances.resize(count);
+    for (std::size_t begin = 0; begin < count;) {
+        const std::uint32_t material = material_of(order[begin]);
+        std::size_t end = begin;
+        batch.pending_surfaces.clear();
+        for (; end < count && material_of(order[end]) == material; ++end) {
+            batch.pending_surfaces.push_back(batch.shadow_surfaces[order[end]]);
+        }
+        batch.pending_radiance.resize(end - begin);
+        const ShadingContext shading =
+            shading_with_paths(scene, end - begin, batch.path_infos, [&](std::size_t k) {
+                const std::uint32_t ray = batch.shadow_places[order[begin + k]];
+                return light_path_info(batch.counters[batch.shadow_rays[ray].path], true);
+            });
+        evaluate_transparency(scene.materials[material],
+                              shading,
+                              batch.pending_surfaces,
+                              batch.scratch,
+                              batch.pending_radiance);
+        for (std::size_t k = begin; k < end; ++k) {
+            batch.transmittances[order[k]] = batch.pending_radiance[k - begin];
+        }
+        begin = end;
+    }
+}
+
+// One surface along each remaining shadow ray: contributions are multiplied by its transmittance
+// and the ray goes on behind it; opaque surfaces end it.
+void pass_one_surface(const RenderContext& context, PathBatch& batch) {
+    collect_transparent(context, batch);
+    evaluate_transmittances(context, batch);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < batch.shadow_places.size(); ++k) {
+        const std::uint32_t i = batch.shadow_places[k];
+        const SurfaceInteraction& surface = batch.shadow_surfaces[k];
         const Ray ray = batch.shadow_queries[i];
-        const SurfaceInteraction surface = scene.interaction(ray, hit);
-        const Material& material = scene.materials[surface.material];
-        if (!material.transparent) {
-            continue;
-        }
-        Rgb transmittance(0.0f);
-        if (scene.needs.light_path) {
-            batch.path_infos[0] = light_path_info(batch.counters[batch.shadow_rays[i].path], true);
-        }
-        evaluate_transparency(
-            material, shading, std::span(&surface, 1), batch.scratch, std::span(&transmittance, 1));
         ShadowRay shadow = batch.shadow_rays[i];
-        shadow.contribution *= transmittance;
+        shadow.contribution *= batch.transmittances[k];
         if (is_zero(shadow.contribution)) {
             continue;
         }

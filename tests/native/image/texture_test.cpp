@@ -293,6 +293,9 @@ TEST(Texture, AlphaModes) {
                       srgb_to_linear(0.2f) * 0.5f,
                       0.5f);
     EXPECT_TRUE(near(look(ImageColorSpace::Srgb, ImageAlpha::Straight, false), curved));
+    // As Cycles, to floats that come multiplied it is applied as they are.
+    const Vec4 direct(srgb_to_linear(0.8f), srgb_to_linear(0.4f), srgb_to_linear(0.2f), 0.5f);
+    EXPECT_TRUE(near(look(ImageColorSpace::Srgb, ImageAlpha::Premultiplied, false), direct));
 }
 
 TEST(Texture, BrokenTexelsDoNotSpread) {

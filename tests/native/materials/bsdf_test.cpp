@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/color.h"
+#include "core/visibility.h"
 #include "materials/closure_albedo.h"
 #include "materials/lobes/ggx.h"
 #include "native/materials/closure_cases.h"
@@ -291,6 +292,34 @@ TEST(Bsdf, TraitsSeeDeltaTransmissionAndAlpha) {
     EXPECT_NEAR(traits.transmission_probability, 0.5f / 0.75f, 0.02f);
     EXPECT_FLOAT_EQ(traits.min_alpha, 0.25f);
     EXPECT_NEAR(traits.albedo.x, 1.0f, 0.03f);
+}
+
+// A light that some rays do not see is seen by the lobes of the others alone.
+TEST(Bsdf, LobesAreTakenByWhatTheySee) {
+    Surface surface;
+    const Bsdf& bsdf = build(surface, make_context(kZ, 405), [&](auto& c, auto& s) {
+        ScatterInputs in;
+        in.normal = kZ;
+        in.roughness = 0.5f;
+        in.weight = Rgb(0.3f);
+        setup_diffuse(in, c, s);
+        setup_glossy(in, c, s);
+        setup_translucent(in, c, s);
+        setup_refraction(in, c, s);
+    });
+    Random random(11);
+    for (int i = 0; i < 200; ++i) {
+        const Vec3 wi = random.direction();
+        const BsdfEval all = eval_bsdf(bsdf, wi);
+        const BsdfEval diffuse = eval_bsdf_seeing(bsdf, wi, kVisibleDiffuse);
+        const BsdfEval glossy = eval_bsdf_seeing(bsdf, wi, kVisibleGlossy);
+        const BsdfEval refracted = eval_bsdf_seeing(bsdf, wi, kVisibleTransmission);
+        const float sum = diffuse.f_cos.x + glossy.f_cos.x + refracted.f_cos.x;
+        EXPECT_NEAR(sum, all.f_cos.x, 1e-5f * all.f_cos.x);
+        EXPECT_NEAR(diffuse.pdf + glossy.pdf + refracted.pdf, all.pdf, 1e-5f * all.pdf);
+        EXPECT_EQ(wi.z < 0.0f ? glossy.f_cos.x : refracted.f_cos.x, 0.0f);
+        EXPECT_TRUE(is_zero(eval_bsdf_seeing(bsdf, wi, kVisibleCamera).f_cos));
+    }
 }
 
 }  // namespace

@@ -257,5 +257,36 @@ TEST(ProgramTexture, Gradients) {
     EXPECT_FLOAT_EQ(run(GradientMode::Spherical, {2, 0, 0}), 0.0f);
 }
 
+// Each tile is an image of its own; beside them there is nothing.
+TEST(ProgramTexture, TilesAreFoundByTheirNumber) {
+    const std::vector<Texture> textures = {uv_texture(), uv_texture(8)};
+    ProgramBuilder b;
+    ImageUse use;
+    use.image = 0;
+    use.extension = ImageExtension::Extend;
+    use.interpolation = ImageInterpolation::Closest;
+    use.tiles = {{0, 0}, {12, 1}};  // the first, and the third of the second row
+    b.program.images = {use};
+    b.show(b.add(NodeOpCode::Image, 0, {b.geometry(GeometryOutput::Position)}, 4));
+    std::vector<SurfaceInteraction> hits(5);
+    const Vec2 places[] = {{0.3f, 0.6f}, {2.3f, 1.6f}, {1.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, 2e9f}};
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        hits[i].p = Vec3(places[i], 0.0f);
+        hits[i].ns = hits[i].ng = hits[i].wo = Vec3(0, 0, 1);
+        hits[i].instance = kNone;
+    }
+    ShadingContext context;
+    context.textures = textures;
+    const std::vector<Rgb> seen = emission_of(compile(b.program), hits, context);
+    EXPECT_NEAR(seen[0].x, 0.3f, 1.0f / 128.0f);
+    EXPECT_NEAR(seen[0].y, 0.6f, 1.0f / 128.0f);
+    EXPECT_NEAR(seen[1].x, 0.3f, 1.0f / 16.0f);
+    EXPECT_NEAR(seen[1].y, 0.6f, 1.0f / 16.0f);
+    EXPECT_NE(seen[1].x, seen[0].x);
+    for (std::size_t i = 2; i < hits.size(); ++i) {
+        EXPECT_EQ(seen[i], Rgb(1.0f, 0.0f, 1.0f)) << i;
+    }
+}
+
 }  // namespace
 }  // namespace pharos

@@ -398,5 +398,46 @@ TEST(BuildScene, CancelIsObeyed) {
     }
 }
 
+NodeProgram moving_program(NodeOpCode code, std::uint16_t mode, const Vec3& by) {
+    ProgramBuilder b;
+    b.closure(code, mode, {code == NodeOpCode::AovValue ? b.scalar(by.x) : b.color(by)});
+    return b.build();
+}
+
+float height_under(const Built& built, float x) {
+    const Hit hit = built.trace({Vec3(x, 0.2f, 50.0f), Vec3(0, 0, -1)});
+    return hit.instance == kNone ? kNan : 50.0f - hit.t;
+}
+
+TEST(BuildScene, DisplacementMovesVertices) {
+    SceneBuilder b;
+    const auto plain = b.material("plain", diffuse_program(Rgb(0.5f)));
+    const auto moving = b.material("moving", diffuse_program(Rgb(0.5f)));
+    const std::uint32_t mesh = b.mesh(floor_quad());
+    Mat4 twice(2.0f);
+    twice[3] = Vec4(10.0f, 0.0f, 0.0f, 1.0f);
+    Mat4 far(1.0f);
+    far[3] = Vec4(20.0f, 0.0f, 0.0f, 1.0f);
+    b.instance(mesh, {moving}, Mat4(1.0f));
+    b.instance(mesh, {plain}, far);
+    b.object(quad_mesh("large", Vec3(-1, -1, 0), Vec3(2, 0, 0), Vec3(0, 2, 0)), moving, twice);
+    SceneDescription d = b.build();
+    d.materials[1].displacement = moving_program(NodeOpCode::AovValue, 0, Vec3(0.5f));
+    Built built = build(d);
+    EXPECT_NEAR(height_under(built, 0.3f), 0.5f, 1e-5f);
+    EXPECT_NEAR(height_under(built, 20.3f), 0.0f, 1e-5f);  // the same mesh of another material
+    EXPECT_NEAR(height_under(built, 10.3f), 1.0f, 1e-5f);  // in the object's space
+    EXPECT_TRUE(built.report.entries().empty());
+
+    d.materials[1].displacement = moving_program(NodeOpCode::AovColor, 1, Vec3(0, 0, 0.25f));
+    built = build(d);
+    EXPECT_NEAR(height_under(built, 0.3f), 0.25f, 1e-5f);
+    EXPECT_NEAR(height_under(built, 10.3f), 0.25f, 1e-5f);  // in the world's
+
+    d.materials[1].displacement = moving_program(NodeOpCode::AovValue, 0, Vec3(kNan));
+    built = build(std::move(d));
+    EXPECT_NEAR(height_under(built, 0.3f), 0.0f, 1e-5f);
+}
+
 }  // namespace
 }  // namespace pharos::testing

@@ -78,6 +78,10 @@ SceneDescription full_description() {
         {"tint", NormalDomain::Face, 4, {0.5f, nan, 1.0f, 2.0f}}};
     b.description().instance_attributes = {{"object:wear", {Vec4(0.25f), Vec4(1, 2, 3, 4)}}};
     b.description().materials[0].program.ops[0].step = Vec2(0.1f, 0.0f);
+    b.description().lights[0].program = 0;
+    b.description().light_programs = {emission_program(Rgb(0.5f), 2.0f)};
+    b.description().materials[0].displacement = emission_program(Rgb(0.1f), 1.0f);
+    b.description().materials[0].program.images.at(0).tiles = {{12, 3}};
     b.description().passes = {
         pass_bit(FilmPass::Mist), 1.0f, 2.0f, 0.5f, {7, 8}, {9}, {{"wear", false}}};
     return b.build();
@@ -120,6 +124,11 @@ TEST(Dump, RoundTripIsBitEqual) {
     EXPECT_EQ(back.passes.wanted, pass_bit(FilmPass::Mist));
     EXPECT_EQ(back.passes.mist_falloff, 0.5f);
     EXPECT_EQ(back.passes.object_indices, (std::vector<std::uint32_t>{7, 8}));
+    EXPECT_EQ(back.lights.at(0).program, 0u);
+    EXPECT_EQ(back.lights.at(1).program, kNone);
+    EXPECT_EQ(back.light_programs.at(0).ops.at(0).code, NodeOpCode::Emission);
+    EXPECT_EQ(back.materials.at(0).displacement.ops.size(), 1u);
+    EXPECT_EQ(back.materials.at(0).program.images.at(0).tiles.at(0).number, 12u);
     EXPECT_EQ(back.passes.aovs.at(0).name, "wear");
     EXPECT_FALSE(back.passes.aovs.at(0).color);
 }
@@ -156,6 +165,16 @@ TEST(Dump, FilesOfOlderVersionsAreRead) {
         std::memcpy(&bytes[24], &checksum, sizeof(checksum));
         description.passes = version < 2 ? PassesDescription() : description.passes;
         description.passes.aovs.clear();
+        description.light_programs.clear();
+        for (LightDescription& light : description.lights) {
+            light.program = kNone;
+        }
+        for (MaterialDescription& material : description.materials) {
+            material.displacement = {};
+            for (ImageUse& use : material.program.images) {
+                use.tiles.clear();
+            }
+        }
         if (version < 3) {
             forget_attributes(description);
         }

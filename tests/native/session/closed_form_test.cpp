@@ -147,5 +147,31 @@ TEST(ClosedFormStatistics, TransparentShadow) {
     }
 }
 
+// A lamp whose nodes emit a colour shines as one of that strength, also where rays meet it by
+// chance.
+TEST(ClosedFormStatistics, LampsHaveNodes) {
+    const auto scene = [](const Rgb& strength) {
+        SceneBuilder builder;
+        const auto floor = builder.material("floor", diffuse_program(Rgb(0.6f)));
+        builder.object(quad_mesh("floor", Vec3(-4, -4, 0), Vec3(8, 0, 0), Vec3(0, 8, 0)), floor);
+        builder.lamp(area_lamp(look_at(Vec3(0, 0, 2), Vec3(0.2f, 0, 0)), strength, 2.0f, 1.0f));
+        builder.lamp(point_lamp(Vec3(1, 0, 1), strength, 0.1f));
+        builder.camera(Vec3(0, -3, 2), Vec3(0), 0.8f, 16, 12);
+        return with_samples(builder, 64);
+    };
+    const Rgb color(0.5f, 0.25f, 2.0f);
+    const Rendered plain = render(scene(color * 10.0f));
+    SceneDescription description = scene(Rgb(10.0f));
+    description.light_programs = {emission_program(color * 0.5f, 2.0f)};
+    for (LightDescription& light : description.lights) {
+        light.program = 0;
+    }
+    const Rendered by_nodes = render(std::move(description));
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+        EXPECT_GT(plain.mean(channel), 0.01);
+        EXPECT_NEAR(by_nodes.mean(channel) / plain.mean(channel), 1.0, 0.01);
+    }
+}
+
 }  // namespace
 }  // namespace pharos
