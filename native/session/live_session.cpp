@@ -229,8 +229,10 @@ void LiveSession::Impl::run() {
     while (true) {
         busy = false;
         changed.notify_all();
-        changed.wait(
-            lock, [this] { return closing.cancelled() || requests.any() || (waiting && !paused); });
+        changed.wait(lock, [this] {
+            const bool asked = question && guide.current() != nullptr && scene.scene() != nullptr;
+            return closing.cancelled() || requests.any() || (waiting && !paused) || asked;
+        });
         if (closing.cancelled()) {
             return;
         }
