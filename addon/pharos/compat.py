@@ -123,6 +123,11 @@ def material_samples_emission(material) -> bool:
     return getattr(cycles, "sample_as_light", True)
 
 
+def aov_name(node) -> str:
+    """The pass that an AOV Output node writes."""
+    return node.aov_name if hasattr(node, "aov_name") else node.name
+
+
 def displacement_method(material) -> str:
     """'BUMP', 'DISPLACEMENT' or 'BOTH'."""
     if hasattr(material, "displacement_method"):

@@ -15,7 +15,7 @@ from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
 from .export.scene import export_scene, set_view
-from .passes import PASSES, PassRequest, name_unsupported_passes, wanted_passes
+from .passes import PassRequest, film_passes, name_unsupported_passes, wanted_passes
 
 _POLL = 0.05  # seconds between looks at the session and at Blender's Esc
 _FIRST_RESULT = 0.1
@@ -162,11 +162,11 @@ class FinalRender:
 
     def _show_result(self, session, result) -> None:
         passes = result.layers[0].passes
-        for entry in PASSES:
+        for entry in film_passes(self._layer):
             render_pass = passes.get(entry.blender_name)
             if render_pass is None:
                 continue
-            pixels = output.read_pass(self._native, session, entry.film_pass)
+            pixels = output.read_pass(self._native, session, entry)
             if pixels is not None:
                 compat.set_pass_pixels(render_pass, pixels)
         self._engine.update_result(result)
@@ -187,7 +187,7 @@ class FinalRender:
         """Blender writes nothing when it is interrupted in background mode; a watcher may ask."""
         path = os.environ.get("PHAROS_PARTIAL", "")
         if bpy.app.background and path:
-            output.write_partial(self._native, session, path)
+            output.write_partial(self._native, session, film_passes(self._layer), path)
 
     def _post_report(self) -> None:
         if not self._engine.is_preview:

@@ -8,23 +8,24 @@ import time
 
 import numpy as np
 
-from .passes import PASSES
+from .passes import Pass
 
 
-def read_pass(native, session, name: str) -> np.ndarray | None:
-    """Pixels (n, channels) of a film pass, bottom row first; None without picture or pass."""
-    film_pass = getattr(native.FilmPass, name)
-    pixels = np.empty(
-        (session.width * session.height, native.film_pass_channels(film_pass)), np.float32
-    )
-    return pixels if session.read(film_pass, pixels) else None
+def read_pass(native, session, entry: Pass) -> np.ndarray | None:
+    """Pixels (n, channels) of a pass, bottom row first; None without picture or pass."""
+    pixels = np.empty((session.width * session.height, len(entry.channels)), np.float32)
+    if entry.aov >= 0:
+        found = session.read_aov(entry.aov, pixels)
+    else:
+        found = session.read(getattr(native.FilmPass, entry.film_pass), pixels)
+    return pixels if found else None
 
 
-def write_partial(native, session, path: str) -> bool:
-    """The picture as far as it has come, as an EXR file."""
+def write_partial(native, session, entries, path: str) -> bool:
+    """The picture with these passes as far as it has come, as an EXR file."""
     passes = []
-    for entry in PASSES:
-        pixels = read_pass(native, session, entry.film_pass)
+    for entry in entries:
+        pixels = read_pass(native, session, entry)
         if pixels is not None:
             passes.append((entry.name, entry.channels, pixels))
     if not passes:

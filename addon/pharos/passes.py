@@ -10,12 +10,13 @@ from . import compat
 class Pass(NamedTuple):
     """One pass; `switch` is an attribute of the view layer, or of its `pharos` settings."""
 
-    film_pass: str  # enumerator of native.FilmPass
+    film_pass: str  # enumerator of native.FilmPass; empty for what materials write
     name: str  # in files, and in Blender unless it calls the pass otherwise
     channels: str
     kind: str  # VALUE, VECTOR or COLOR
     switch: str = ""
     short_name: str = ""  # in Blender before 5.0
+    aov: int = -1  # place among the passes that materials write
 
     @property
     def blender_name(self) -> str:
@@ -25,7 +26,7 @@ class Pass(NamedTuple):
     @property
     def built_in(self) -> bool:
         """Whether Blender makes room for it by itself."""
-        return not self.switch.startswith("pharos.")
+        return self.aov < 0 and not self.switch.startswith("pharos.")
 
 
 def _light_passes():
@@ -98,9 +99,22 @@ def _is_wanted(view_layer, switch: str) -> bool:
     return bool(switch) and getattr(view_layer, switch)
 
 
+def _aov_passes(view_layer) -> list[Pass]:
+    """What AOV Output nodes may write."""
+    kinds = {"COLOR": ("RGBA", "COLOR"), "VALUE": ("X", "VALUE")}
+    aovs = [aov for aov in view_layer.aovs if aov.is_valid]
+    return [Pass("", aov.name, *kinds[aov.type], aov=i) for i, aov in enumerate(aovs)]
+
+
 def wanted_passes(view_layer) -> list[Pass]:
     """Passes beside Combined that a view layer asks for."""
-    return [entry for entry in PASSES if _is_wanted(view_layer, entry.switch)]
+    asked = [entry for entry in PASSES if _is_wanted(view_layer, entry.switch)]
+    return asked + _aov_passes(view_layer)
+
+
+def film_passes(view_layer) -> list[Pass]:
+    """All that may be read of a render of a view layer."""
+    return [*PASSES, *_aov_passes(view_layer)]
 
 
 def name_unsupported_passes(view_layer, report) -> None:
@@ -108,7 +122,6 @@ def name_unsupported_passes(view_layer, report) -> None:
     cycles = getattr(view_layer, "cycles", None)
     names = [n for switch, n in _UNSUPPORTED.items() if getattr(view_layer, switch, False)]
     names += [n for switch, n in _UNSUPPORTED_CYCLES.items() if getattr(cycles, switch, False)]
-    names += [f"AOV {aov.name}" for aov in view_layer.aovs]
     names += [f"Light Group {group.name}" for group in getattr(view_layer, "lightgroups", ())]
     for name in names:
         report.warn(view_layer.name, f"Pass {name!r} is not supported.")
@@ -118,7 +131,8 @@ class PassRequest:
     """What the export has to know of the passes of a render; by default: none is wanted."""
 
     def __init__(self, wanted: list[Pass] = ()):
-        self._names = {entry.film_pass for entry in wanted}
+        self._names = {entry.film_pass for entry in wanted if entry.aov < 0}
+        self._aovs = [(entry.name, entry.kind == "COLOR") for entry in wanted if entry.aov >= 0]
         self.object_indices: list[int] = []
         self.material_indices: list[int] = []
 
@@ -126,10 +140,17 @@ class PassRequest:
     def needs_uv(self) -> bool:
         return "Uv" in self._names
 
+    @property
+    def aovs(self) -> dict[tuple[str, bool], int]:
+        """Places of the passes that materials write, by name and whether they are colours."""
+        return {key: i for i, key in enumerate(self._aovs)}
+
     def fields(self, native, world) -> dict:
         """Arguments of set_passes, once the scene is exported."""
         bits = sum(native.pass_bit(getattr(native.FilmPass, name)) for name in self._names)
         fields = {"wanted": bits}
+        if self._aovs:
+            fields["aovs"] = [native.AovDescription(*aov) for aov in self._aovs]
         if "ObjectIndex" in self._names:
             fields["object_indices"] = self.object_indices
         if "MaterialIndex" in self._names:

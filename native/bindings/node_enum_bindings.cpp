@@ -88,7 +88,9 @@ void bind_codes(py::module_& m) {
                                            {"Metallic", E::Metallic},
                                            {"Toon", E::Toon},
                                            {"Velvet", E::Velvet},
-                                           {"Sheen", E::Sheen}});
+                                           {"Sheen", E::Sheen},
+                                           {"AovColor", E::AovColor},
+                                           {"AovValue", E::AovValue}});
     }
 }
 

@@ -285,13 +285,22 @@ void bind_views(py::module_& m) {
         .def_readwrite("transparent_bounces", &RenderSettings::transparent_bounces)
         .def_readwrite("caustics_reflective", &RenderSettings::caustics_reflective)
         .def_readwrite("caustics_refractive", &RenderSettings::caustics_refractive);
+    py::class_<AovDescription>(m, "AovDescription", py::module_local())
+        .def(py::init([](std::string name, bool color) {
+                 return AovDescription{std::move(name), color};
+             }),
+             py::arg("name"),
+             py::arg("color"))
+        .def_readonly("name", &AovDescription::name)
+        .def_readonly("color", &AovDescription::color);
     py::class_<PassesDescription>(m, "PassesDescription", py::module_local())
         .def_readwrite("wanted", &PassesDescription::wanted)
         .def_readwrite("mist_start", &PassesDescription::mist_start)
         .def_readwrite("mist_depth", &PassesDescription::mist_depth)
         .def_readwrite("mist_falloff", &PassesDescription::mist_falloff)
         .def_readwrite("object_indices", &PassesDescription::object_indices)
-        .def_readwrite("material_indices", &PassesDescription::material_indices);
+        .def_readwrite("material_indices", &PassesDescription::material_indices)
+        .def_readwrite("aovs", &PassesDescription::aovs);
 }
 
 void bind_adders(py::class_<SceneDescription>& scene) {

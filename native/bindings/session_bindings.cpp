@@ -27,6 +27,14 @@ bool read_pass(const RenderSession& session,
     return session.read(pass, pixels);
 }
 
+bool read_aov(const RenderSession& session,
+              std::size_t index,
+              py::array_t<float, py::array::c_style>& out) {
+    const std::span<float> pixels(out.mutable_data(), static_cast<std::size_t>(out.size()));
+    const py::gil_scoped_release release;
+    return session.read_aov(index, pixels);
+}
+
 void bind_guide_status(py::module_& m) {
     py::class_<GuideStatus>(m, "GuideStatus", py::module_local())
         .def_readonly("enabled", &GuideStatus::enabled)
@@ -156,7 +164,13 @@ void bind_session(py::module_& m) {
              FloatGuard(),
              py::arg("film_pass"),
              py::arg("out").noconvert(),
-             "Fills `out` (float32, C order, bottom row first); False while there is no picture.");
+             "Fills `out` (float32, C order, bottom row first); False while there is no picture.")
+        .def("read_aov",
+             &read_aov,
+             FloatGuard(),
+             py::arg("index"),
+             py::arg("out").noconvert(),
+             "The same of a pass that materials write, by its place in the description's AOVs.");
 }
 
 }  // namespace pharos

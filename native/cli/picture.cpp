@@ -41,6 +41,13 @@ void write_picture(const RenderSession& session,
             }
         }
     }
+    for (std::size_t i = 0; i < session.aovs().size(); ++i) {
+        const AovDescription& aov = session.aovs()[i];
+        auto& buffer = buffers.emplace_back(pixels * (aov.color ? 4 : 1));
+        if (session.read_aov(i, buffer)) {
+            passes.push_back({aov.name, aov_channels(aov), buffer});
+        }
+    }
     const ExrOptions options{false, shard_metadata(info)};
     require_written(write_exr(path, session.width(), session.height(), passes, options));
 }

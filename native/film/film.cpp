@@ -90,6 +90,19 @@ void Film::read_on_request(FilmPass pass, std::span<float> out) const {
     }
 }
 
+void Film::read_aov(std::size_t index, std::span<float> out) const {
+    CHECK(index < passes_.aovs().size());
+    const PassLayout::AovPlace place = passes_.aovs()[index];
+    CHECK_EQ(out.size(), weight_.size() * place.channels);
+    for (std::size_t i = 0; i < weight_.size(); ++i) {
+        const double* block = &blocks_[i * passes_.size() + place.offset];
+        const double scale = weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
+        for (std::size_t c = 0; c < place.channels; ++c) {
+            out[i * place.channels + c] = static_cast<float>(block[c] * scale);
+        }
+    }
+}
+
 void Film::add(std::uint32_t pixel, const FilmSample& sample, double weight, bool even) {
     DCHECK(is_finite(sample.radiance));
     double* sum = &sum_[std::size_t{pixel} * 4];

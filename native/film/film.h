@@ -60,6 +60,9 @@ class Film {
     // is 0 (depth: 1e10, mist: 1).
     void read(FilmPass pass, std::span<float> out) const;
 
+    // Likewise of a pass that materials write: passes().aovs()[index].
+    void read_aov(std::size_t index, std::span<float> out) const;
+
     // Relative standard error of the picture, from the two halves; 1 with fewer than two passes.
     [[nodiscard]] double noise() const;
 

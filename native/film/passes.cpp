@@ -49,7 +49,7 @@ int film_pass_channels(FilmPass pass) {
     return static_cast<int>(std::string_view(film_pass_info(pass).channels).size());
 }
 
-PassLayout::PassLayout(std::uint32_t wanted) {
+PassLayout::PassLayout(std::uint32_t wanted, std::span<const AovDescription> aovs) {
     for (std::size_t i = 0; i < kFilmPasses; ++i) {
         const auto pass = static_cast<FilmPass>(i);
         if ((wanted & pass_bit(pass)) != 0 && color_of(pass) != FilmPass::Count) {
@@ -68,6 +68,10 @@ PassLayout::PassLayout(std::uint32_t wanted) {
             }
         }
         if (!at_the_end) {
+            for (const AovDescription& aov : aovs) {
+                aovs_.push_back({size_, aov.color ? 4u : 1u});
+                size_ += aovs_.back().channels;
+            }
             sample_size_ = size_;
         }
     }

@@ -1,4 +1,5 @@
 // The passes of a picture beside its colour: which there are, which are asked for, where they lie.
+// Materials may write passes of their own beside those (AOVs).
 //
 // Every film holds the basic passes. The others cost nothing unless they are asked for: PassLayout
 // gives each a place in one block of floats per camera sample (what paths write, averaged over the
@@ -8,6 +9,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace pharos {
 
@@ -97,10 +100,23 @@ inline constexpr std::uint32_t kLightPasses =
     pass_bit(FilmPass::TransmissionDirect) | pass_bit(FilmPass::TransmissionIndirect) |
     pass_bit(FilmPass::TransmissionColor);
 
+// A pass that materials write by name: a colour, with a fourth channel of 1 where one wrote, or a
+// number. A mean over the samples.
+struct AovDescription {
+    std::string name;
+    bool color = true;
+
+    bool operator==(const AovDescription&) const = default;
+};
+
+[[nodiscard]] inline const char* aov_channels(const AovDescription& aov) {
+    return aov.color ? "RGBA" : "X";
+}
+
 class PassLayout {
   public:
     // Bits of unknown and of basic passes are ignored; light brings its colour along.
-    explicit PassLayout(std::uint32_t wanted = 0);
+    explicit PassLayout(std::uint32_t wanted = 0, std::span<const AovDescription> aovs = {});
 
     [[nodiscard]] bool wants(FilmPass pass) const { return (wanted_ & pass_bit(pass)) != 0; }
 
@@ -110,6 +126,13 @@ class PassLayout {
     [[nodiscard]] std::uint32_t offset(FilmPass pass) const {
         return offset_[static_cast<std::size_t>(pass)];
     }
+
+    struct AovPlace {
+        std::uint32_t offset = 0;
+        std::uint32_t channels = 0;
+    };
+
+    [[nodiscard]] std::span<const AovPlace> aovs() const { return aovs_; }
 
     // Floats of a camera sample; the rest of the block is written at the end.
     [[nodiscard]] std::uint32_t sample_size() const { return sample_size_; }
@@ -121,6 +144,7 @@ class PassLayout {
     std::uint32_t sample_size_ = 0;
     std::uint32_t size_ = 0;
     std::array<std::uint32_t, kFilmPasses> offset_{};
+    std::vector<AovPlace> aovs_;
 };
 
 }  // namespace pharos

@@ -104,6 +104,39 @@ struct Layout {
     return std::string(info.name) + "." + info.channels[letter];
 }
 
+[[nodiscard]] bool is_film_pass(std::string_view name) {
+    for (std::size_t i = 0; i < kFilmPasses; ++i) {
+        if (name == film_pass_info(static_cast<FilmPass>(i)).name) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Passes that materials wrote, known by their channels' letters; the number of their channels.
+std::size_t add_aovs(const ExrFile& exr, Layout& layout) {
+    std::size_t known = 0;
+    for (const bool color : {true, false}) {
+        const std::string letters = aov_channels({"", color});
+        for (const std::string& channel : exr.channels) {
+            const std::string name = channel.substr(0, channel.rfind('.'));
+            if (!channel.ends_with(std::string(".") + letters[0]) || is_film_pass(name)) {
+                continue;
+            }
+            layout.passes.push_back({name, letters, {}});
+            for (const char letter : letters) {
+                const auto at = find_channel(exr, name + "." + letter);
+                if (!at) {
+                    throw std::runtime_error("a channel is missing");
+                }
+                layout.channels[*at] = {Rule::Mean, 0};
+                ++known;
+            }
+        }
+    }
+    return known;
+}
+
 [[nodiscard]] Layout layout_of(const ExrFile& exr) {
     Layout layout;
     layout.channels.resize(exr.channels.size());
@@ -133,6 +166,7 @@ struct Layout {
             }
         }
     }
+    known += add_aovs(exr, layout);
     if (!counted || known != exr.channels.size()) {
         throw std::runtime_error("its channels are not those of a Pharos picture");
     }

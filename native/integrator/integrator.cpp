@@ -46,7 +46,7 @@ void BatchStatistics::add(const BatchStatistics& other) {
 Integrator::Integrator(const Scene& scene, ThreadPool& pool)
     : scene_(scene),
       pool_(pool),
-      passes_(scene.description.passes.wanted),
+      passes_(scene.description.passes.wanted, scene.description.passes.aovs),
       camera_(
           scene.description.camera, scene.description.film.width, scene.description.film.height),
       filter_(scene.description.film.filter, scene.description.film.filter_width) {

@@ -133,6 +133,10 @@ struct PathBatch {
 
     std::vector<PathInfo> path_infos;  // where programs ask how paths came
 
+    // --- passes that materials write ---
+    std::vector<std::uint32_t> aov_paths;  // of the hits that write
+    std::vector<Vec3> aov_values;
+
     ShadingScratch scratch;
 };
 

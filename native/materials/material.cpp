@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -255,12 +256,16 @@ std::optional<float> Compiler::constant_of(const NodeOp& op, std::uint32_t numbe
 
 // Files a closure under the questions it answers, and sets the flags.
 void Compiler::emit_closure(const NodeOp& op) {
-    if (is_zero_constant(op, 0, 3)) {
-        return;
-    }
     Material& m = material_;
     std::uint32_t most = 1;
     bool scatters = true;
+    if (op.code == NodeOpCode::AovColor || op.code == NodeOpCode::AovValue) {
+        m.aovs.closures.push_back(op);
+        return;
+    }
+    if (is_zero_constant(op, 0, 3)) {
+        return;
+    }
     switch (op.code) {
         case NodeOpCode::Emission:
         case NodeOpCode::Background:
@@ -355,14 +360,16 @@ void Compiler::take_slices() {
     std::vector<std::uint8_t> live;
     m.emission.values = live_values(m.emission.closures, live);
     m.transparency.values = live_values(m.transparency.closures, live);
-    m.surface.values = live_values(m.surface.closures, live);
     m.straight_alpha.assign(out_.images.size(), 0);
-    for (const NodeOp& op : m.surface.values) {
-        if (op.code == NodeOpCode::Image || op.code == NodeOpCode::EnvironmentImage) {
-            m.straight_alpha[op.mode] = live[static_cast<std::size_t>(op.output) + 3];
-            m.textured = true;
+    for (ProgramSlice* slice : {&m.surface, &m.aovs}) {
+        slice->values = live_values(slice->closures, live);
+        for (const NodeOp& op : slice->values) {
+            if (op.code == NodeOpCode::Image || op.code == NodeOpCode::EnvironmentImage) {
+                m.straight_alpha[op.mode] |= live[static_cast<std::size_t>(op.output) + 3];
+                m.textured = true;
+            }
+            m.asks_path = m.asks_path || op.code == NodeOpCode::LightPath;
         }
-        m.asks_path = m.asks_path || op.code == NodeOpCode::LightPath;
     }
     m.max_closures = std::min(m.max_closures, static_cast<std::uint32_t>(kMaxClosures));
     m.constant = m.surface.values.empty();
@@ -370,25 +377,32 @@ void Compiler::take_slices() {
     m.transparent = !m.transparency.closures.empty();
 }
 
-// Leaves no gaps where operations went. The surface slice holds the operations of the others too.
+// Leaves no gaps where operations went. The slices of surface and AOVs hold those of the others
+// too.
 void Compiler::renumber() {
-    std::vector<std::int32_t> place(static_cast<std::size_t>(next_register_), 0);
+    constexpr std::int32_t kNowhere = -1;
+    std::vector<std::int32_t> place(static_cast<std::size_t>(next_register_), kNowhere);
     std::int32_t next = 0;
-    for (const NodeOp& op : material_.surface.values) {
-        OpShape shape;
-        static_cast<void>(find_shape(out_, op, shape));
-        for (std::uint32_t k = 0; k < shape.outputs; ++k) {
-            place[static_cast<std::size_t>(op.output) + k] = next++;
+    for (const ProgramSlice* slice : {&material_.surface, &material_.aovs}) {
+        for (const NodeOp& op : slice->values) {
+            OpShape shape;
+            static_cast<void>(find_shape(out_, op, shape));
+            const auto first = place.begin() + op.output;
+            if (*first == kNowhere) {
+                std::iota(first, first + shape.outputs, next);
+                next += static_cast<std::int32_t>(shape.outputs);
+            }
         }
     }
-    ProgramSlice* slices[] = {&material_.surface, &material_.emission, &material_.transparency};
+    ProgramSlice* slices[] = {
+        &material_.surface, &material_.emission, &material_.transparency, &material_.aovs};
     for (ProgramSlice* slice : slices) {
         for (NodeOp& op : slice->values) {
             op.output = place[static_cast<std::size_t>(op.output)];
         }
     }
     for (std::int32_t& operand : out_.operands) {
-        operand = operand >= 0 ? place[static_cast<std::size_t>(operand)] : operand;
+        operand = operand >= 0 ? std::max(place[static_cast<std::size_t>(operand)], 0) : operand;
     }
     out_.register_count = static_cast<std::uint32_t>(next);
     out_.ops = material_.surface.values;

@@ -34,6 +34,7 @@ struct Material {
     ProgramSlice surface;       // all closures
     ProgramSlice emission;      // those that emit
     ProgramSlice transparency;  // those that let light straight through
+    ProgramSlice aovs;          // what it writes to passes, in place of closures
     std::vector<std::optional<SkyModel>> skies;  // of Sky operations, by table
     std::vector<std::uint8_t> straight_alpha;    // by image use: its alpha is read too
     std::uint32_t max_closures = 0;              // that one hit can have
@@ -135,6 +136,17 @@ void evaluate_transparency(const Material& material,
                            std::span<const SurfaceInteraction> hits,
                            ShadingScratch& scratch,
                            std::span<Rgb> transmittance);
+
+// What a material writes to AOVs: its operation material.aovs.closures[k] gives hit i
+// values[k * hits.size() + i]; of a number all components are the same.
+void evaluate_aovs(const Material& material,
+                   const ShadingContext& context,
+                   std::span<const SurfaceInteraction> hits,
+                   ShadingScratch& scratch,
+                   std::span<Vec3> values);
+
+// The world as a far sphere seen from inside: hits whose position is the direction.
+[[nodiscard]] SurfaceInteraction world_hit(const Vec3& direction);
 
 // World radiance along directions (from the camera outwards).
 void evaluate_world(const Material& world,

@@ -116,6 +116,9 @@ enum class NodeOpCode : std::uint16_t {
     Toon = 112,          // weight:3 color:3 size:1 smooth:1 normal:3; mode = 0 diffuse, 1 glossy
     Velvet = 113,        // weight:3 color:3 sigma:1 normal:3
     Sheen = 114,         // weight:3 color:3 roughness:1 normal:3
+    // --- passes of materials; mode = index of the AOV ---
+    AovColor = 115,  // color:3
+    AovValue = 116,  // value:1
 };
 
 enum class GeometryOutput : std::uint16_t {
@@ -311,12 +314,21 @@ struct NodeOp {
 
 enum class ImageProjection : std::uint32_t { Flat, Box, Sphere, Tube, Equirectangular, MirrorBall };
 
+// A part of an image that covers [u, u + 1) x [v, v + 1): number = 10 v + u, u below 10.
+struct ImageTile {
+    std::uint32_t number = 0;
+    std::uint32_t image = 0xffffffffu;
+
+    bool operator==(const ImageTile&) const = default;
+};
+
 struct ImageUse {
     std::uint32_t image = 0xffffffffu;  // into SceneDescription::images; none: magenta
     ImageInterpolation interpolation = ImageInterpolation::Linear;
     ImageExtension extension = ImageExtension::Repeat;
     ImageProjection projection = ImageProjection::Flat;
     float projection_blend = 0.0f;
+    std::vector<ImageTile> tiles{};  // of a tiled image; elsewhere there is nothing
 
     bool operator==(const ImageUse&) const = default;
 };

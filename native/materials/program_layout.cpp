@@ -75,6 +75,8 @@ constexpr OpLayout kLayouts[] = {
     {NodeOpCode::Toon, OpKind::Closure, "33113*", 0},
     {NodeOpCode::Velvet, OpKind::Closure, "3313*", 0},
     {NodeOpCode::Sheen, OpKind::Closure, "3313*", 0},
+    {NodeOpCode::AovColor, OpKind::Closure, "3", 0},
+    {NodeOpCode::AovValue, OpKind::Closure, "1", 0},
 };
 
 [[nodiscard]] bool below(std::uint16_t mode, std::uint16_t flags, std::size_t count) {

@@ -192,25 +192,53 @@ void evaluate_transparency(const Material& material,
                  });
 }
 
+void evaluate_aovs(const Material& material,
+                   const ShadingContext& context,
+                   std::span<const SurfaceInteraction> hits,
+                   ShadingScratch& scratch,
+                   std::span<Vec3> values) {
+    CHECK_EQ(values.size(), hits.size() * material.aovs.closures.size());
+    for_each_run(material,
+                 context,
+                 scratch,
+                 hits,
+                 {},
+                 material.aovs.values,
+                 [&](const Evaluation& e, std::size_t first) {
+                     Vec3* out = values.data() + first;
+                     for (const NodeOp& op : material.aovs.closures) {
+                         const detail::Operand value = e.operand(op, 0);
+                         for (std::size_t lane = 0; lane < e.lanes; ++lane) {
+                             out[lane] = op.code == NodeOpCode::AovColor ? value.vector(lane)
+                                                                         : Vec3(value.scalar(lane));
+                         }
+                         out += hits.size();
+                     }
+                 });
+}
+
+SurfaceInteraction world_hit(const Vec3& direction) {
+    SurfaceInteraction hit;
+    hit.p = direction;
+    hit.wo = hit.ns = hit.ng = -direction;  // normals face us
+    hit.instance = kNone;
+    hit.triangle = kNone;
+    return hit;
+}
+
 void evaluate_world(const Material& world,
                     const ShadingContext& context,
                     std::span<const Vec3> directions,
                     ShadingScratch& scratch,
                     std::span<Rgb> radiance) {
     CHECK_EQ(radiance.size(), directions.size());
-    // The world is a far sphere seen from inside: its position is the direction, its normals face
-    // us.
     std::vector<SurfaceInteraction>& hits = scratch.hits;
     hits.resize(std::max(hits.size(), std::min(directions.size(), kMaxLanes)));
     ShadingContext part = context;
     for (std::size_t first = 0; first < directions.size(); first += kMaxLanes) {
         const std::size_t lanes = std::min(kMaxLanes, directions.size() - first);
         for (std::size_t i = 0; i < lanes; ++i) {
-            SurfaceInteraction& hit = hits[i];
-            hit.p = directions[first + i];
-            hit.wo = hit.ns = hit.ng = -hit.p;
-            hit.instance = kNone;
-            hit.triangle = kNone;
+            hits[i] = world_hit(directions[first + i]);
         }
         if (!context.paths.empty()) {
             part.paths = context.paths.subspan(first, lanes);

@@ -31,7 +31,7 @@ inline constexpr bool kPlain =
     std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> || std::is_same_v<T, UVec3> ||
     std::is_same_v<T, Mat4>;
 
-inline constexpr std::uint32_t kVersion = 3;  // 2: passes on request; 3: attributes
+inline constexpr std::uint32_t kVersion = 4;  // 2: passes on request; 3: attributes; 4: AOVs, tiles
 inline constexpr std::uint32_t kOldestVersion = 1;
 
 class Writer {

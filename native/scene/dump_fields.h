@@ -107,9 +107,18 @@ void fields(Archive& archive, DumpValue<Archive, NodeOp>& value) {
 }
 
 template <class Archive>
+void fields(Archive& archive, DumpValue<Archive, ImageTile>& value) {
+    auto& [number, image] = value;
+    archive(number, image);
+}
+
+template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, ImageUse>& value) {
-    auto& [image, interpolation, extension, projection, projection_blend] = value;
+    auto& [image, interpolation, extension, projection, projection_blend, tiles] = value;
     archive(image, interpolation, extension, projection, projection_blend);
+    if (archive.version() >= 4) {
+        archive(tiles);
+    }
 }
 
 template <class Archive>
@@ -222,9 +231,19 @@ void fields(Archive& archive, DumpValue<Archive, RenderSettings>& value) {
 }
 
 template <class Archive>
+void fields(Archive& archive, DumpValue<Archive, AovDescription>& value) {
+    auto& [name, color] = value;
+    archive(name, color);
+}
+
+template <class Archive>
 void fields(Archive& archive, DumpValue<Archive, PassesDescription>& value) {
-    auto& [wanted, mist_start, mist_depth, mist_falloff, object_indices, material_indices] = value;
+    auto& [wanted, mist_start, mist_depth, mist_falloff, object_indices, material_indices, aovs] =
+        value;
     archive(wanted, mist_start, mist_depth, mist_falloff, object_indices, material_indices);
+    if (archive.version() >= 4) {
+        archive(aovs);
+    }
 }
 
 template <class Archive>

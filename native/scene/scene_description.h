@@ -14,6 +14,7 @@
 #include "core/math.h"
 #include "core/visibility.h"
 #include "film/film_description.h"
+#include "film/passes.h"
 #include "geometry/mesh.h"
 #include "image/image_description.h"
 #include "lights/light_description.h"
@@ -81,6 +82,7 @@ struct PassesDescription {
     float mist_falloff = 2.0f;                    // exponent
     std::vector<std::uint32_t> object_indices;    // of each instance; 0 beyond the end
     std::vector<std::uint32_t> material_indices;  // of each material; likewise
+    std::vector<AovDescription> aovs;
 
     bool operator==(const PassesDescription&) const = default;
 };

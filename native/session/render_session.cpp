@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <ctime>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <new>
@@ -112,6 +113,7 @@ struct RenderSession::Impl {
     std::uint32_t width = 0;
     std::uint32_t height = 0;
     PassLayout passes;
+    std::vector<AovDescription> aovs;
 
     mutable std::mutex mutex;  // guards everything below but the film's pixels
     mutable std::condition_variable ended;
@@ -141,6 +143,11 @@ struct RenderSession::Impl {
     void note(Severity severity, const std::string& object, const std::string& message);
     void end(SessionState state, const std::string& error);
 
+    // Checks the size of `out`, then lets `copy` take it from the newest film.
+    bool read(std::size_t channels,
+              std::span<const float> out,
+              const std::function<void(const Film&)>& copy) const;
+
     [[nodiscard]] bool is_ended() const { return progress.state >= SessionState::Finished; }
 };
 
@@ -161,6 +168,28 @@ void RenderSession::Impl::note(Severity severity,
                                const std::string& message) {
     const std::lock_guard lock(mutex);
     report.add(severity, object, message);
+}
+
+bool RenderSession::Impl::read(std::size_t channels,
+                               std::span<const float> out,
+                               const std::function<void(const Film&)>& copy) const {
+    const std::size_t expected = std::size_t{width} * height * channels;
+    if (out.size() != expected) {
+        throw std::invalid_argument("RenderSession.read: the buffer holds " +
+                                    std::to_string(out.size()) + " floats, the pass has " +
+                                    std::to_string(expected));
+    }
+    std::shared_ptr<SharedFilm> newest;
+    {
+        const std::lock_guard lock(mutex);
+        newest = film;
+    }
+    if (!newest) {
+        return false;
+    }
+    const std::unique_lock lock(newest->mutex);
+    copy(newest->film);
+    return true;
 }
 
 void RenderSession::Impl::run(SceneDescription description) {
@@ -254,7 +283,8 @@ void RenderSession::Impl::render(const Scene& scene,
     ThreadPool pool(options.threads);
     Integrator integrator(scene, pool);
     const auto shared_film = std::make_shared<SharedFilm>(
-        scene.description.film, PassLayout(scene.description.passes.wanted));
+        scene.description.film,
+        PassLayout(scene.description.passes.wanted, scene.description.passes.aovs));
     std::optional<GuideController> own_guide;
     GuideController& guide = built != nullptr ? built->guide : own_guide.emplace(make_guide(scene));
     Work work{pool, integrator, *shared_film, guide, {}};
@@ -396,7 +426,8 @@ RenderSession::RenderSession(SceneDescription description, SessionOptions option
     : impl_(std::make_unique<Impl>()) {
     impl_->width = description.film.crop_width;
     impl_->height = description.film.crop_height;
-    impl_->passes = PassLayout(description.passes.wanted);
+    impl_->aovs = description.passes.aovs;
+    impl_->passes = PassLayout(description.passes.wanted, impl_->aovs);
     std::ranges::sort(options.snapshot_samples);
     impl_->options = std::move(options);
     impl_->driver = std::jthread([impl = impl_.get(), scene = std::move(description)]() mutable {
@@ -482,27 +513,20 @@ bool RenderSession::has(FilmPass pass) const {
 }
 
 bool RenderSession::read(FilmPass pass, std::span<float> out) const {
-    if (!has(pass)) {
-        return false;
-    }
-    const std::size_t expected = std::size_t{impl_->width} * impl_->height *
-                                 static_cast<std::size_t>(film_pass_channels(pass));
-    if (out.size() != expected) {
-        throw std::invalid_argument("RenderSession.read: the buffer holds " +
-                                    std::to_string(out.size()) + " floats, the pass has " +
-                                    std::to_string(expected));
-    }
-    std::shared_ptr<SharedFilm> film;
-    {
-        const std::lock_guard lock(impl_->mutex);
-        film = impl_->film;
-    }
-    if (!film) {
-        return false;
-    }
-    const std::unique_lock lock(film->mutex);
-    film->film.read(pass, out);
-    return true;
+    return has(pass) && impl_->read(static_cast<std::size_t>(film_pass_channels(pass)),
+                                    out,
+                                    [&](const Film& film) { film.read(pass, out); });
+}
+
+std::span<const AovDescription> RenderSession::aovs() const {
+    return impl_->aovs;
+}
+
+bool RenderSession::read_aov(std::size_t index, std::span<float> out) const {
+    return index < impl_->aovs.size() &&
+           impl_->read(impl_->passes.aovs()[index].channels, out, [&](const Film& film) {
+               film.read_aov(index, out);
+           });
 }
 
 }  // namespace pharos

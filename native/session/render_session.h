@@ -123,6 +123,10 @@ class RenderSession {
     // without a guide.
     [[nodiscard]] std::vector<std::byte> field() const;
 
+    // The passes that materials write, and their newest state: 4 or 1 floats a pixel. As read().
+    [[nodiscard]] std::span<const AovDescription> aovs() const;
+    bool read_aov(std::size_t index, std::span<float> out) const;
+
   private:
     struct Impl;
     struct Work;

@@ -98,6 +98,74 @@ def test_values_are_those_of_cycles():
     scene.pharos.follow_cycles = False
 
 
+def _aov_output(tree, name: str, value: float, color=None):
+    """An AOV Output node; its colour comes from `color`, a socket, or is grey."""
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    setattr(node, "aov_name" if hasattr(node, "aov_name") else "name", name)
+    node.inputs["Color"].default_value = (0.5, 0.6, 0.7, 0.8)
+    node.inputs["Value"].default_value = value
+    if color is not None:
+        tree.links.new(color, node.inputs["Color"])
+
+
+def _aov_group():
+    """A node group whose AOV node writes what comes into the group."""
+    group = bpy.data.node_groups.new("Writes", "ShaderNodeTree")
+    if hasattr(group, "interface"):
+        group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    else:
+        group.inputs.new("NodeSocketColor", "Tint")
+    start = group.nodes.new("NodeGroupInput")
+    _aov_output(group, "Grouped", 2.0, start.outputs[0])
+    return group
+
+
+def _still_life_with_aovs():
+    scene = _still_life(64)
+    materials = bpy.data.materials
+    glow, pane = materials["Glow"], materials["Pane"]
+    place = harness.node(glow, "ShaderNodeNewGeometry")
+    _aov_output(glow.node_tree, "Where", 3.0, place.outputs["Position"])
+    inside = harness.node(glow, "ShaderNodeGroup")
+    inside.node_tree = _aov_group()
+    inside.inputs[0].default_value = (0.9, 0.2, 0.4, 1.0)
+    _aov_output(pane.node_tree, "Where", 5.0)  # mostly clear: what is behind it adds
+    world = scene.world
+    world.use_nodes = True
+    _aov_output(world.node_tree, "Number", 7.0)
+    for name, kind in (("Where", "COLOR"), ("Number", "VALUE"), ("Grouped", "COLOR")):
+        aov = bpy.context.view_layer.aovs.add()
+        aov.name, aov.type = name, kind
+    _aov_output(glow.node_tree, "Number", -3.0)
+    return scene
+
+
+def test_passes_of_materials_are_those_of_cycles():
+    scene = _still_life_with_aovs()
+    try:
+        theirs, ours = _both("aovs")
+        out = harness.exported()
+        assert harness.report() == [], harness.report()
+    finally:
+        while bpy.context.view_layer.aovs:
+            bpy.ops.scene.view_layer_remove_aov()
+        scene.pharos.follow_cycles = False
+    expected = {f"{name}.{c}" for name in ("Where", "Grouped") for c in "RGBA"} | {"Number.X"}
+    assert expected <= set(ours), set(ours)
+    _compare(theirs, ours, 0.08)
+    for channel in expected:
+        error = abs(ours[channel].mean() - theirs[channel].mean())
+        assert error < 0.01 * np.abs(theirs[channel]).mean(), (channel, error)
+        assert np.ptp(ours[channel]) > 0.1 or channel.endswith("A"), channel
+    assert [aov.name for aov in out.passes.aovs] == ["Where", "Number", "Grouped"]
+    assert not any("Aov" in op for op in _ops_of_a_scene_without_aovs())
+
+
+def _ops_of_a_scene_without_aovs() -> list[str]:
+    out = harness.exported()
+    return [op for material in out.materials for op in harness.ops_of(material.program)]
+
+
 def test_transparent_film_and_mist_shapes():
     scene = _still_life(16)
     scene.render.film_transparent = True
@@ -236,16 +304,13 @@ def test_unsupported_passes_are_named():
     harness.add_camera()
     layer = bpy.context.view_layer
     layer.use_pass_subsurface_direct = layer.use_pass_vector = layer.use_pass_mist = True
-    layer.aovs.add().name = "Mask"
     try:
         harness.render()
         named = [line.split(": ", 1)[1] for line in harness.report()]
     finally:
         layer.use_pass_subsurface_direct = layer.use_pass_vector = layer.use_pass_mist = False
-        bpy.ops.scene.view_layer_remove_aov()
-    names = ("Vector", "Subsurface Direct", "AOV Mask")
+    names = ("Vector", "Subsurface Direct")
     assert named == [f"Pass {name!r} is not supported." for name in names], named
-    assert not layer.aovs
 
 
 def test_names_agree_with_the_native_module():

@@ -20,12 +20,14 @@ class MaterialSet(NamedTuple):
 class MaterialTable:
     """Indices of materials and of the sets that instances refer to."""
 
-    def __init__(self, native, description, images, report, override=None):
-        self._native = native
-        self._description = description
-        self._images = images
-        self._report = report
-        self._override = override
+    def __init__(self, context):
+        """`context`: the export's, with its images."""
+        self._native = context.native
+        self._description = context.description
+        self._images = context.images
+        self._report = context.report
+        self._override = context.view_layer.material_override
+        self._aovs = context.passes.aovs
         self._materials: dict[int, tuple[int, Flattened | None]] = {}
         self._sets: dict[tuple[int, ...], int] = {}
         self.pass_indices: list[int] = []  # of each material added
@@ -36,7 +38,9 @@ class MaterialTable:
             return self._native.NONE, None
         key = material.original.as_pointer()
         if key not in self._materials:
-            flat = flatten_material(self._native, self._images, self._report, material)
+            flat = flatten_material(
+                self._native, self._images, self._report, material, self._aovs
+            )
             index = self._description.add_material(
                 name=material.name,
                 program=flat.program,

@@ -39,6 +39,7 @@ class Flattener:
         self.version = compat.version_number()
         self.material_index = 0
         self.moves_surface = False
+        self.aovs: dict[tuple[str, bool], int] = {}  # passes by name and whether they are colours
         self.program = ProgramBuilder(native)
         self.image_values: dict[tuple, Value] = {}  # image nodes: colour and alpha at once
         self._values: dict[tuple, Value] = {}
@@ -146,18 +147,29 @@ class Flattener:
         output = tree.get_output_node("CYCLES")
         if output is not None:
             scope = Scope(tree)
-            self._name_outputs(tree)
             if self.linked(output, scope, "Volume"):
                 self.warn("Volume is not supported.")
             if self.linked(output, scope, "Displacement"):
                 self._displace(resolve(input_by_identifier(output, "Displacement"), scope))
             self.shader(output, scope, surface, self.program.constant(1.0))
+        if self.aovs:
+            self._write_aovs(Scope(tree))
         return self.result()
 
-    def _name_outputs(self, tree) -> None:
-        for node in tree.nodes:
-            if node.bl_idname == "ShaderNodeOutputAOV" and not node.mute:
-                self.unsupported(node)
+    def _write_aovs(self, scope: Scope) -> None:
+        """What AOV Output nodes, in groups too, give to passes that are asked for."""
+        for node in scope.tree.nodes:
+            if node.mute:
+                continue
+            if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+                self._write_aovs(Scope(node.node_tree, node, scope))
+            if node.bl_idname != "ShaderNodeOutputAOV":
+                continue
+            for code, socket, size in (("AovColor", "Color", 3), ("AovValue", "Value", 1)):
+                place = self.aovs.get((compat.aov_name(node), size == 3))
+                if place is not None:
+                    value = self.input(node, scope, socket, size)
+                    self.program.closure(code, [value], place)
 
     def _displace(self, source: Source) -> None:
         """Displacement tilts the normal that all closures start from."""
@@ -185,8 +197,9 @@ class Flattener:
         )
 
 
-def flatten_material(native, images, report, material) -> Flattened:
+def flatten_material(native, images, report, material, aovs=()) -> Flattened:
     flattener = Flattener(native, images, report, material.name)
+    flattener.aovs = dict(aovs)
     flattener.material_index = material.pass_index
     flattener.moves_surface = compat.displacement_method(material) != "BUMP"
     if material.use_nodes and material.node_tree is not None:
@@ -208,8 +221,9 @@ def flatten_light(native, images, report, light) -> Flattened:
     return Flattener(native, images, report, light.name).flatten(light.node_tree)
 
 
-def flatten_world(native, images, report, world) -> Flattened:
+def flatten_world(native, images, report, world, aovs=()) -> Flattened:
     flattener = Flattener(native, images, report, world.name, is_world=True)
+    flattener.aovs = dict(aovs)
     if world.use_nodes and world.node_tree is not None:
         return flattener.flatten(world.node_tree)
     program = flattener.program

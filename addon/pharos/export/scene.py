@@ -66,10 +66,8 @@ def export_scene(
         passes or PassRequest(),
         library,
     )
-    context.images = ImageTable(native, description, report, library)
-    context.materials = MaterialTable(
-        native, description, context.images, report, view_layer.material_override
-    )
+    context.images = ImageTable(native, description, report, scene.frame_current, library)
+    context.materials = MaterialTable(context)
     context.passes.material_indices = context.materials.pass_indices
     description.set_settings(**render_settings(native, scene, view_layer))
     InstanceExporter(context).run()

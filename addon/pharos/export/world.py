@@ -22,7 +22,8 @@ def export_world(context) -> None:
     world = context.scene.world
     if world is None:
         return
-    flat = flatten_world(context.native, context.images, context.report, world)
+    aovs = context.passes.aovs
+    flat = flatten_world(context.native, context.images, context.report, world, aovs)
     cycles = getattr(world, "cycles", None)
     method = getattr(cycles, "sampling_method", "AUTOMATIC")
     manual = method == "MANUAL"

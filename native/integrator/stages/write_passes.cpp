@@ -1,4 +1,5 @@
 #include "core/color.h"
+#include "integrator/path_info.h"
 #include "integrator/stages.h"
 #include "integrator/surface_alpha.h"
 
@@ -84,7 +85,8 @@ void write_surface(const RenderContext& context,
     const SurfaceInteraction& surface = batch.surfaces[s];
     const Rgb alpha = surface_alpha(context.scene.materials[surface.material], batch.bsdfs[s]);
     bool& done = batch.counters[path].passes_done;
-    if (!done && passes.wants_any(kSingleSurface) && is_shown(alpha)) {
+    const bool wants_single = passes.wants_any(kSingleSurface) || !passes.aovs().empty();
+    if (!done && wants_single && is_shown(alpha)) {
         write_single_surface(context, surface, path, batch);
         done = true;
     }
@@ -111,6 +113,85 @@ void write_background(const RenderContext& context, PathBatch& batch) {
     }
 }
 
+// Adds what a material wrote for one of its hits: values lie `stride` apart, one for each of its
+// operations.
+void add_aovs(const RenderContext& context,
+              const Material& material,
+              std::uint32_t path,
+              std::span<const Vec3> values,
+              std::size_t stride,
+              PathBatch& batch) {
+    const std::span<const PassLayout::AovPlace> places = context.passes.aovs();
+    float* block = &batch.root_passes[std::size_t{batch.root[path]} * context.passes.sample_size()];
+    for (std::size_t k = 0; k < material.aovs.closures.size(); ++k) {
+        const NodeOp& op = material.aovs.closures[k];
+        const Vec3& value = values[k * stride];
+        const bool color = op.code == NodeOpCode::AovColor;
+        if (op.mode >= places.size() || (places[op.mode].channels == 4) != color ||
+            !is_finite(value)) {
+            continue;
+        }
+        float* out = block + places[op.mode].offset;
+        const float rgba[4] = {value.x, value.y, value.z, 1.0f};
+        for (std::uint32_t c = 0; c < places[op.mode].channels; ++c) {
+            out[c] += rgba[c];
+        }
+    }
+}
+
+// As in Cycles: by every surface up to the first that is shown, whole, however clear it is.
+void write_surface_aovs(const RenderContext& context, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    std::vector<SurfaceInteraction>& hits = batch.pending_surfaces;
+    std::vector<std::uint32_t>& paths = batch.aov_paths;
+    std::uint32_t begin = 0;
+    for (std::size_t m = 0; m < scene.materials.size() && !batch.surfaces.empty(); ++m) {
+        const Material& material = scene.materials[m];
+        const std::uint32_t end = batch.material_count[m];  // evaluate_materials() has sorted
+        hits.clear();
+        paths.clear();
+        for (std::uint32_t k = begin; k < end && !material.aovs.closures.empty(); ++k) {
+            const std::uint32_t s = batch.material_order[k];
+            const PathCounters& counters = batch.counters[batch.surface_path[s]];
+            if (counters.from_camera && !counters.passes_done) {
+                hits.push_back(batch.surfaces[s]);
+                paths.push_back(batch.surface_path[s]);
+            }
+        }
+        begin = end;
+        batch.aov_values.resize(hits.size() * material.aovs.closures.size());
+        const ShadingContext shading =
+            shading_with_paths(scene, hits.size(), batch.path_infos, [&](std::size_t i) {
+                return path_info(batch.counters[paths[i]]);
+            });
+        evaluate_aovs(material, shading, hits, batch.scratch, batch.aov_values);
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+            const std::span<const Vec3> values(batch.aov_values);
+            add_aovs(context, material, paths[i], values.subspan(i), hits.size(), batch);
+        }
+    }
+}
+
+void write_world_aovs(const RenderContext& context, PathBatch& batch) {
+    const Scene& scene = context.scene;
+    if (scene.world.aovs.closures.empty()) {
+        return;
+    }
+    batch.aov_values.resize(scene.world.aovs.closures.size());
+    for (const std::uint32_t i : batch.escaped) {
+        const std::uint32_t path = batch.active[i];
+        const PathCounters& counters = batch.counters[path];
+        if (!counters.from_camera || counters.passes_done) {
+            continue;
+        }
+        const SurfaceInteraction hit = world_hit(batch.rays[i].direction);
+        const ShadingContext shading = shading_with_paths(
+            scene, 1, batch.path_infos, [&](std::size_t) { return world_path_info(counters); });
+        evaluate_aovs(scene.world, shading, std::span(&hit, 1), batch.scratch, batch.aov_values);
+        add_aovs(context, scene.world, path, batch.aov_values, 1, batch);
+    }
+}
+
 }  // namespace
 
 std::uint64_t write_passes(const RenderContext& context, PathBatch& batch) {
@@ -118,6 +199,10 @@ std::uint64_t write_passes(const RenderContext& context, PathBatch& batch) {
         return 0;
     }
     std::uint64_t items = 0;
+    if (!context.passes.aovs().empty()) {
+        write_surface_aovs(context, batch);
+        write_world_aovs(context, batch);
+    }
     for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
         const std::uint32_t path = batch.surface_path[s];
         if (batch.counters[path].from_camera) {

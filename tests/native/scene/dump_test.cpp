@@ -78,7 +78,8 @@ SceneDescription full_description() {
         {"tint", NormalDomain::Face, 4, {0.5f, nan, 1.0f, 2.0f}}};
     b.description().instance_attributes = {{"object:wear", {Vec4(0.25f), Vec4(1, 2, 3, 4)}}};
     b.description().materials[0].program.ops[0].step = Vec2(0.1f, 0.0f);
-    b.description().passes = {pass_bit(FilmPass::Mist), 1.0f, 2.0f, 0.5f, {7, 8}, {9}};
+    b.description().passes = {
+        pass_bit(FilmPass::Mist), 1.0f, 2.0f, 0.5f, {7, 8}, {9}, {{"wear", false}}};
     return b.build();
 }
 
@@ -119,9 +120,23 @@ TEST(Dump, RoundTripIsBitEqual) {
     EXPECT_EQ(back.passes.wanted, pass_bit(FilmPass::Mist));
     EXPECT_EQ(back.passes.mist_falloff, 0.5f);
     EXPECT_EQ(back.passes.object_indices, (std::vector<std::uint32_t>{7, 8}));
+    EXPECT_EQ(back.passes.aovs.at(0).name, "wear");
+    EXPECT_FALSE(back.passes.aovs.at(0).color);
 }
 
-// Older versions lack what came later: passes on request, then attributes and steps.
+void forget_attributes(SceneDescription& description) {
+    description.instance_attributes.clear();
+    for (Mesh& mesh : description.meshes) {
+        mesh.attributes.clear();
+    }
+    for (MaterialDescription& material : description.materials) {
+        for (NodeOp& op : material.program.ops) {
+            op.step = Vec2(0.0f);
+        }
+    }
+}
+
+// Older versions lack what came later: passes on request, attributes and steps, AOVs.
 TEST(Dump, FilesOfOlderVersionsAreRead) {
     for (std::uint32_t version = 1; version < dump::kVersion; ++version) {
         constexpr std::size_t kHeader = 32;
@@ -140,14 +155,9 @@ TEST(Dump, FilesOfOlderVersionsAreRead) {
         std::memcpy(&bytes[16], &size, sizeof(size));
         std::memcpy(&bytes[24], &checksum, sizeof(checksum));
         description.passes = version < 2 ? PassesDescription() : description.passes;
-        description.instance_attributes.clear();
-        for (Mesh& mesh : description.meshes) {
-            mesh.attributes.clear();
-        }
-        for (MaterialDescription& material : description.materials) {
-            for (NodeOp& op : material.program.ops) {
-                op.step = Vec2(0.0f);
-            }
+        description.passes.aovs.clear();
+        if (version < 3) {
+            forget_attributes(description);
         }
         EXPECT_EQ(dump_to_bytes(dump_from_bytes(bytes)), dump_to_bytes(description)) << version;
     }

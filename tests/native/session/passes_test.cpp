@@ -44,7 +44,7 @@ SceneDescription card() {
     SceneDescription d = b.build();
     d.film.filter = PixelFilter::Box;
     d.settings.samples = 8;
-    d.passes = {all_passes(), 1.0f, 6.0f, 1.0f, {3, 7}, {11}};
+    d.passes = {all_passes(), 1.0f, 6.0f, 1.0f, {3, 7}, {11}, {}};
     return d;
 }
 
@@ -98,6 +98,41 @@ TEST(Passes, TransparentSurfacesLetPassesThrough) {
     EXPECT_FLOAT_EQ(read(session, FilmPass::Emission)[3 * kLeft + 2], 0.75f * 0.8f);
     EXPECT_FLOAT_EQ(read(session, FilmPass::Environment)[3 * kRight], 0.75f * 0.5f);
     EXPECT_EQ(read(session, FilmPass::ObjectIndex)[kLeft], 7.0f);
+}
+
+// What a program that emits writes beside: its emission's colour as AOV 0, `value` as AOV 1.
+NodeProgram writing_program(const Rgb& color, float value) {
+    ProgramBuilder b;
+    b.closure(NodeOpCode::Emission, 0, {b.color(Vec3(1)), b.color(color), b.scalar(1.0f)});
+    b.closure(NodeOpCode::AovColor, 0, {b.color(color)});
+    b.closure(NodeOpCode::AovValue, 1, {b.scalar(value)});
+    b.closure(NodeOpCode::AovValue, 0, {b.scalar(9.0f)});   // a colour's place: not written
+    b.closure(NodeOpCode::AovValue, 12, {b.scalar(9.0f)});  // no place
+    return b.build();
+}
+
+TEST(Passes, MaterialsWriteTheirOwn) {
+    SceneDescription d = card();
+    d.materials[0].program = writing_program(Rgb(0.25f, 0.5f, 2.0f), -3.0f);
+    d.passes.wanted = 0;
+    d.passes.aovs = {{"color", true}, {"value", false}};
+    const RenderSession session(std::move(d), 2);
+    finish(session);
+    std::vector<float> color(8 * 4 * 4);
+    std::vector<float> value(8 * 4);
+    ASSERT_TRUE(session.read_aov(0, color));
+    ASSERT_TRUE(session.read_aov(1, value));
+    EXPECT_FALSE(session.read_aov(2, value));
+    EXPECT_THROW(static_cast<void>(session.read_aov(0, value)), std::invalid_argument);
+    constexpr std::size_t kLeft = 8 + 1;
+    constexpr std::size_t kRight = 8 + 6;
+    const float expected[4] = {0.25f, 0.5f, 2.0f, 1.0f};
+    for (std::size_t c = 0; c < 4; ++c) {
+        EXPECT_FLOAT_EQ(color[4 * kLeft + c], expected[c]);
+        EXPECT_EQ(color[4 * kRight + c], 0.0f);
+    }
+    EXPECT_FLOAT_EQ(value[kLeft], -3.0f);
+    EXPECT_EQ(value[kRight], 0.0f);
 }
 
 TEST(Passes, NoneWantedCostNothing) {
