@@ -367,8 +367,10 @@ LivePicture LiveSession::picture() const {
 
 bool LiveSession::wait(std::chrono::milliseconds time) const {
     std::unique_lock lock(impl_->mutex);
-    return impl_->changed.wait_for(
-        lock, time, [&] { return !impl_->busy && !impl_->requests.any(); });
+    // While it is not busy the driver waits, and `waiting` stays as it is.
+    return impl_->changed.wait_for(lock, time, [&] {
+        return !impl_->busy && !impl_->requests.any() && !(impl_->waiting && !impl_->paused);
+    });
 }
 
 }  // namespace pharos
