@@ -18,6 +18,7 @@ from harness.scenes import Engine, Scene
 
 SIZE = (128, 96)
 SIGMA = 0.2
+CONDITIONS = {"conditions": {"threads": 2, "scenes": {"ramp": "key"}}}
 CRASH = [sys.executable, "-c", "import os; os.abort()"]
 
 
@@ -89,7 +90,7 @@ def plan(programs, seeds=3, budgets=(4, 16, 64)):
 
 def run(tmp_path, programs, **kinds):
     chosen = plan(programs, **kinds)
-    journal = results.Journal(tmp_path / "rows.csv", {"conditions": 1})
+    journal = results.Journal(tmp_path / "rows.csv", CONDITIONS)
     Runner(chosen, journal, programs=programs, reference_pair=halves).run()
     return results.read(tmp_path / "rows.csv")[1]
 
@@ -169,8 +170,12 @@ def test_an_interrupted_run_goes_on(tmp_path):
 def test_other_conditions_begin_anew(tmp_path):
     run(tmp_path, {"good": good}, seeds=1)
     path = tmp_path / "rows.csv"
-    assert len(results.Journal(path, {"conditions": 1}).rows) == 3
-    assert results.Journal(path, {"conditions": 2}).rows == []
+    more = {"conditions": {"threads": 2, "scenes": {"ramp": "key", "other": "key"}}}
+    assert len(results.Journal(path, more).rows) == 3
+    changed = {"conditions": {"threads": 2, "scenes": {"ramp": "another"}}}
+    assert results.Journal(path, changed).rows == []
+    run(tmp_path, {"good": good}, seeds=1)
+    assert results.Journal(path, {"conditions": {"threads": 1}}).rows == []
 
 
 def test_a_program_that_does_not_end_is_killed():

@@ -8,13 +8,14 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmark"))
 
-from harness import slides, slides_page
+from harness import readme, results, slides, slides_page
 from harness.engines import Shot
 
+ROOT = Path(__file__).resolve().parents[2]
 META = {"date": "1 May 2026", "command": "tests/benchmark/slides", "threads": 2, "seeds": 2,
         "machine": "A Processor", "versions": {"Pharos": "9.9"},
         "long_run": {"passes": 10000, "size": [16, 12], "nonfinite_pixels": 0,
-                     "dropped_samples": 0, "mean": 0.5, "mean_of_others": 0.4}}
+                     "dropped_samples": 0, "mean": 0.5, "mean_of_others": 0.4, "bound": 0.02}}
 # Error of every engine, relative to next-event estimation; halved by 64 frames of training.
 SIZES = {"NEE and BSDF": 1.0, "position": 0.8, "position and normal": 0.5, "mixture": 0.25,
          "BSDF alone": 8.0, "guided without NEE": 2.0, "mixture without NEE": 1.0}
@@ -85,4 +86,11 @@ def test_page_and_readme_are_made(tmp_path):
     part = slides_page.readme_section(META, small_rows())
     assert part.startswith(slides_page.BEGIN)
     assert "| lamp under its shade | 2.50x" in part
-    assert "the mean is 1.2500 of" in " ".join(part.split())
+    assert "the mean is 1.250 +- 0.050 of" in " ".join(part.split())
+
+
+def test_readme_is_what_the_published_csv_gives():
+    path = ROOT / "tests/benchmark/results/slides.csv"
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    part = readme.between(text, slides_page.BEGIN, slides_page.END)[1]
+    assert part == slides_page.readme_section(*results.read(path))

@@ -11,6 +11,7 @@ import numpy as np
 from harness import metric
 
 OURS = "pharos"
+UNKNOWN = 10.0  # an interval that reaches so many times beyond its value says nothing
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,8 @@ def geometric_means(entries, baseline):
 
 def ratio_words(ratio):
     interval = "" if math.isnan(ratio.low) else f" [{ratio.low:.2f}, {ratio.high:.2f}]"
+    if ratio.high > UNKNOWN * ratio.value:
+        interval = " [unknown]"
     return f"{ratio.value:.2f}x{interval}"
 
 

@@ -83,17 +83,28 @@ def pictures(rows):
     return [row for row in rows if "trimmed" in row]
 
 
+def still_valid(before, meta):
+    """A function that says of a row of `before` whether it was measured as `meta` wants it."""
+    old, new = (dict(m.get("conditions", {})) for m in (before, meta))
+    scenes = [conditions.pop("scenes", {}) for conditions in (old, new)]
+
+    def valid(row):
+        keys = [table.get(row["scene"]) for table in scenes]
+        return old == new and keys[0] == keys[1]
+
+    return valid
+
+
 class Journal:
-    """The rows so far of a run, on disk; begins anew where the conditions are others."""
+    """The rows so far of a run, on disk; those of other conditions than now are left out."""
 
     def __init__(self, path, meta, fresh=False):
         self.path, self.meta, self.rows = path, meta, []
         if path.exists() and not fresh:
             before, rows = read(path)
-            if before.get("conditions") == meta.get("conditions"):
-                self.meta = before
-                # What failed is tried again.
-                self.rows = pictures(rows)
+            valid = still_valid(before, meta)
+            # What failed is tried again.
+            self.rows = [row for row in pictures(rows) if valid(row)]
         write(path, self.meta, self.rows)
 
     def add(self, rows):

@@ -102,10 +102,13 @@ def long_run(threads):
     guided, plain = (next(iter(engines.render_pharos(
         small, {"guiding": mode, **options}, [(LONG_PASSES, 1)], threads)))
         for mode, options in (("SLIDES", more), ("NEURAL", {})))
+    difference_of_pixels = (guided.pixels - plain.pixels).mean(axis=-1)
+    bound = 1.96 * float(difference_of_pixels.std()) / difference_of_pixels.size**0.5
     return {"passes": LONG_PASSES, "size": list(LONG_SIZE),
             "nonfinite_pixels": int(np.count_nonzero(~np.isfinite(guided.pixels))),
             "dropped_samples": guided.facts["dropped"],
             "mean": float(guided.pixels.mean()), "mean_of_others": float(plain.pixels.mean()),
+            "bound": bound,
             "seconds": guided.seconds}
 
 
@@ -157,7 +160,7 @@ def measure(options, arguments):
             "machine": machine.processor(), "threads": options.threads,
             "versions": machine.versions({"pharos"}), "seeds": options.seeds, "window": WINDOW,
             "conditions": {"program": machine.content(program), "threads": options.threads,
-                           "scenes": [scene.key() for scene in scenes]}}
+                           "scenes": {scene.name: scene.key() for scene in scenes}}}
     partial = OUT.with_suffix(".partial.csv")
     journal = results.Journal(partial, meta, options.fresh)
     for plan in plans(scenes, options.seeds, options.threads):

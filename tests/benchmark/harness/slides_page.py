@@ -127,10 +127,11 @@ def long_words(meta):
     if not run:
         return ""
     width, height = run["size"]
-    ratio = run["mean"] / run["mean_of_others"]
+    ratio, bound = (run[name] / run["mean_of_others"] for name in ("mean", "bound"))
     return (f"{run['passes']} passes of one lobe at {width} x {height} pixels: "
             f"{run['nonfinite_pixels']} pixels are not finite, {run['dropped_samples']} samples "
-            f"were dropped; the mean is {ratio:.4f} of that of the default's render.")
+            f"were dropped; the mean is {ratio:.3f} +- {bound:.3f} of that of the default's "
+            "render.")
 
 
 def _markdown(head, lines):
