@@ -45,7 +45,8 @@ class Viewport:
         self._denoiser = None
         self._denoised = 0  # number of the picture that was shown without noise
         self._paused = False  # a final render has the processor
-        self._interval = _SHORTEST_INTERVAL
+        self._next_draw = 0.0  # of more samples of the same picture
+        self._drawn_pictures = 0
         _open.add(self)
         self._start_timer()
 
@@ -97,6 +98,11 @@ class Viewport:
         serial = self._session.progress().render.serial
         return self._drawn is None or serial != self._drawn[0]
 
+    def is_due(self) -> bool:
+        """A new picture is shown at once, more samples of one when drawing has had its share."""
+        new = self._session.progress().pictures != self._drawn_pictures
+        return new or time.monotonic() >= self._next_draw
+
     def yield_to_render(self) -> None:
         """Stop while a final render is under way; go on from the start afterwards."""
         rendering = bpy.app.is_job_running("RENDER")
@@ -123,8 +129,8 @@ class Viewport:
         progress = self._session.progress()
         failed = progress.render.state == self._native.SessionState.Failed
         engine.update_stats("", progress.render.error if failed else live_line(progress))
-        wished = (time.monotonic() - began) / _DRAWING_SHARE
-        self._interval = min(max(wished, _SHORTEST_INTERVAL), _LONGEST_INTERVAL)
+        now = time.monotonic()
+        self._next_draw = now + min((now - began) / _DRAWING_SHARE, _LONGEST_INTERVAL)
 
     def _set_view(self, description, state: ViewState, depsgraph) -> None:
         scene = depsgraph.scene_eval
@@ -157,6 +163,7 @@ class Viewport:
                 return  # this one, or what it has become, is taken when the thread is free
             self._denoiser.start(pixels, progress.pictures)
         self._drawn = serial, self._crop
+        self._drawn_pictures = progress.pictures
         if self._denoised != progress.pictures:
             self._show(pixels)
 
@@ -191,9 +198,9 @@ class Viewport:
             if viewport is None or viewport.session is None:
                 return None
             viewport.yield_to_render()
-            if viewport.has_news():
+            if viewport.has_news() and viewport.is_due():
                 viewport.redraw()
-            return viewport._interval
+            return _SHORTEST_INTERVAL
 
         bpy.app.timers.register(look, first_interval=_SHORTEST_INTERVAL)
 

@@ -229,8 +229,10 @@ void LiveSession::Impl::run() {
     while (true) {
         busy = false;
         changed.notify_all();
-        changed.wait(
-            lock, [this] { return closing.cancelled() || requests.any() || (waiting && !paused); });
+        changed.wait(lock, [this] {
+            const bool asked = question && guide.current() != nullptr && scene.scene() != nullptr;
+            return closing.cancelled() || requests.any() || (waiting && !paused) || asked;
+        });
         if (closing.cancelled()) {
             return;
         }
@@ -365,8 +367,10 @@ LivePicture LiveSession::picture() const {
 
 bool LiveSession::wait(std::chrono::milliseconds time) const {
     std::unique_lock lock(impl_->mutex);
-    return impl_->changed.wait_for(
-        lock, time, [&] { return !impl_->busy && !impl_->requests.any(); });
+    // While it is not busy the driver waits, and `waiting` stays as it is.
+    return impl_->changed.wait_for(lock, time, [&] {
+        return !impl_->busy && !impl_->requests.any() && !(impl_->waiting && !impl_->paused);
+    });
 }
 
 }  // namespace pharos
