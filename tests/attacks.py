@@ -143,7 +143,8 @@ seconds = time.monotonic() - began
 card(32)
 alive = harness.close(harness.render()[..., :3], (0.2, 0.4, 0.6), 1e-5)
 harness.say(f'STRESS Blender under ulimit -v, 16k x 16k: seconds to the message|1|{{seconds}}|5')
-harness.say(f'STRESS its message is none, or the next render wrong|2|{{int(not message) + int(not alive)}}|0')
+wrong = int(not message) + int(not alive)
+harness.say(f'STRESS its message is none, or the next render wrong|2|{{wrong}}|0')
 os._exit(0)
 """
 

@@ -7,6 +7,7 @@ written to its file, or complete in Blender's Render Result.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -30,10 +31,8 @@ def path_for(scene, layer: str, view: str) -> str:
     if not scene.pharos.use_checkpoint:
         return ""
     stem = _stem(scene, scene.frame_current)
-    try:
+    with suppress(OSError):  # the native part names the folder when it cannot write
         stem.parent.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        pass  # the native part names the folder when it cannot write
     parts = [stem.name, _word(layer), *([_word(view)] if view else [])]
     return str(stem.with_name(".".join(parts) + _SUFFIX))
 

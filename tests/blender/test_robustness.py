@@ -63,7 +63,7 @@ def test_empty_trees():
 
 def test_cyclic_links():
     material = harness.material("Cyclic")
-    first, second = harness.node(material, "ShaderNodeMath"), harness.node(material, "ShaderNodeMath")
+    first, second = (harness.node(material, "ShaderNodeMath") for _ in range(2))
     shader = harness.node(material, "ShaderNodeEmission")
     harness.connect(material, first.outputs[0], second.inputs[0])
     harness.connect(material, second.outputs[0], first.inputs[0])
@@ -92,7 +92,7 @@ def test_group_without_a_tree():
 def test_missing_library():
     path = harness.TEMPORARY / "library.blend"
     bpy.data.libraries.write(str(path), {harness.emission(name="Linked")}, fake_user=True)
-    with bpy.data.libraries.load(str(path), link=True) as (source, target):
+    with bpy.data.libraries.load(str(path), link=True) as (_, target):
         target.materials = ["Linked"]
     linked = target.materials[0]
     _card(linked)

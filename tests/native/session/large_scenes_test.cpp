@@ -55,7 +55,7 @@ TEST(LargeScenes, ManyInstances) {
     for (std::uint64_t i = 0; i < count; ++i) {
         Mat4 m(1.0f);
         m[3] = Vec4(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(0, 3), 1);
-        builder.instance(mesh, red, m);
+        builder.instance(mesh, {red}, m);
     }
     expect_picture("instances", count, builder.build());
 }
@@ -83,10 +83,9 @@ TEST(LargeScenes, ManyMaterials) {
     for (std::uint64_t i = 0; i < count; ++i) {
         Mat4 m(1.0f);
         m[3] = Vec4(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(0, 3), 1);
-        builder.instance(mesh,
-                         builder.material(std::to_string(i),
-                                          glossy_program(random.uniform3(), random.uniform())),
-                         m);
+        const auto material = builder.material(std::to_string(i),
+                                               glossy_program(random.uniform3(), random.uniform()));
+        builder.instance(mesh, {material}, m);
     }
     expect_picture("materials", count, builder.build());
 }
@@ -106,7 +105,8 @@ TEST(LargeScenes, ManyImages) {
         use.image = builder.image(std::move(image));
         Mat4 m(1.0f);
         m[3] = Vec4(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(0, 3), 1);
-        builder.instance(mesh, builder.material(std::to_string(i), image_diffuse_program(use)), m);
+        const auto material = builder.material(std::to_string(i), image_diffuse_program(use));
+        builder.instance(mesh, {material}, m);
     }
     expect_picture("images", count, builder.build());
 }
