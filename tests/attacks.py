@@ -143,7 +143,7 @@ seconds = time.monotonic() - began
 card(32)
 alive = harness.close(harness.render()[..., :3], (0.2, 0.4, 0.6), 1e-5)
 harness.say(f'STRESS Blender under ulimit -v, 16k x 16k: seconds to the message|1|{{seconds}}|5')
-wrong = int(not message) + int(not alive)
+wrong = int('Out of memory' not in message) + int(not alive)
 harness.say(f'STRESS its message is none, or the next render wrong|2|{{wrong}}|0')
 os._exit(0)
 """
@@ -154,13 +154,13 @@ def memory(table: Table) -> None:
     with tempfile.TemporaryDirectory() as name:
         scene, folder = write_scene(Path(name)), Path(name)
         wrong = 0
-        for gigabytes in (0.25, 0.1, 0.06):
+        for gigabytes in (0.55, 0.6, 1.0):
             done = subprocess.run([CLI, "render", scene, "-o", folder / "x.exr", "--threads", "1"],
                                   preexec_fn=limited(gigabytes), capture_output=True, check=False,
                                   timeout=60)
-            # Either it fits or it says that it does not; the loader itself may lack room.
-            said = b"memory" in done.stderr or b"cannot" in done.stderr
-            wrong += not (done.returncode == 0 or (done.returncode in (4, 127) and said))
+            # Either it fits or it says that it does not.
+            wrong += done.returncode not in (0, 4) or (done.returncode == 4) != (
+                b"memory" in done.stderr)
         table.add("memory", "pharos-cli under ulimit -v: neither a picture nor a message", "3",
                   wrong, 0)
         script = folder / "memory.py"
@@ -170,11 +170,22 @@ def memory(table: Table) -> None:
                                          "--python-exit-code", "3", "--python", script], 120)
 
 
+def _wait_for_handler(pid: int, number: int) -> None:
+    """Loading the libraries takes a second; only then the program catches signals itself."""
+    for _ in range(200):
+        time.sleep(0.1)
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+        caught = next(line for line in status.splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) >> (number - 1) & 1:
+            time.sleep(0.5)
+            return
+
+
 def _code(*arguments, cut_by: int = 0) -> int:
     process = subprocess.Popen([str(word) for word in (CLI, *arguments)],
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     if cut_by:
-        time.sleep(1.0)
+        _wait_for_handler(process.pid, cut_by)
         process.send_signal(cut_by)
     return process.wait(60)
 
@@ -186,20 +197,23 @@ def exits(table: Table) -> None:
         broken = Path(name) / "broken.pharos"
         broken.write_bytes(scene.read_bytes()[:-100])
         forever = ("--samples", "10000000")
-        found = {
-            "0 done": _code("render", scene, "-o", out) == 0 and out.exists(),
-            "1 damaged scene": _code("render", broken, "-o", out) == 1,
-            "1 no scene": _code("render", "/nowhere", "-o", out) == 1,
-            "2 wrong option": _code("render", scene, "-o", out, "--no-such", "1") == 2,
-            "2 wrong number": _code("render", scene, "-o", out, "--samples", "x") == 2,
-            "5 no such folder": _code("render", scene, "-o", "/nowhere/x.exr") == 5,
-            "130 interrupted": _code("render", scene, "-o", out, *forever,
-                                     cut_by=signal.SIGINT) == 130,
-            "143 terminated": _code("render", scene, "-o", out, *forever,
-                                    cut_by=signal.SIGTERM) == 143,
-        }
-        wrong = [what for what, right in found.items() if not right]
-        table.add("exits", f"exit codes that are others {wrong or ''}", str(len(found)),
+        cases = (
+            (0, (scene, "-o", out)),
+            (1, (broken, "-o", out)),
+            (1, ("/nowhere", "-o", out)),
+            (2, (scene, "-o", out, "--no-such", "1")),
+            (2, (scene, "-o", out, "--samples", "x")),
+            (5, (scene, "-o", "/nowhere/x.exr")),
+            (130, (scene, "-o", out, *forever)),
+            (143, (scene, "-o", out, *forever)),
+        )
+        signals = {130: signal.SIGINT, 143: signal.SIGTERM}
+        wrong = []
+        for expected, arguments in cases:
+            code = _code("render", *arguments, cut_by=signals.get(expected, 0))
+            if code != expected:
+                wrong.append(f"{code} for {expected}")
+        table.add("exits", f"exit codes that are others {wrong or ''}", str(len(cases)),
                   len(wrong), 0)
 
 

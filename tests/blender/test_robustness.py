@@ -1,6 +1,8 @@
 """Scenes that are broken or odd in what only Blender can make: all of them render."""
 # hosts: blender bpy
 
+from contextlib import suppress
+
 import bpy
 import harness
 import numpy as np
@@ -16,7 +18,7 @@ def _renders(what: str) -> np.ndarray:
 
 
 def _card(material):
-    harness.new_scene(8, 8, 2)
+    """Once the material is made: a new scene removes all there are."""
     harness.add_camera()
     harness.add_object(harness.plane_mesh(half=10.0), material)
 
@@ -43,6 +45,7 @@ def _nested(depth: int):
 
 
 def test_groups_nested_fifty_deep():
+    harness.new_scene(8, 8, 2)
     material = harness.material("Nested")
     group = material.node_tree.nodes.new("ShaderNodeGroup")
     group.node_tree = _nested(50)
@@ -53,6 +56,7 @@ def test_groups_nested_fifty_deep():
 
 
 def test_empty_trees():
+    harness.new_scene(8, 8, 2)
     material = harness.material("Empty")
     material.node_tree.nodes.clear()
     _card(material)
@@ -62,6 +66,7 @@ def test_empty_trees():
 
 
 def test_cyclic_links():
+    harness.new_scene(8, 8, 2)
     material = harness.material("Cyclic")
     first, second = (harness.node(material, "ShaderNodeMath") for _ in range(2))
     shader = harness.node(material, "ShaderNodeEmission")
@@ -74,6 +79,7 @@ def test_cyclic_links():
 
 
 def test_muted_nodes():
+    harness.new_scene(8, 8, 2)
     material = harness.emission((0.2, 0.4, 0.6))
     for node in material.node_tree.nodes:
         node.mute = node.bl_idname == "ShaderNodeEmission"
@@ -82,6 +88,7 @@ def test_muted_nodes():
 
 
 def test_group_without_a_tree():
+    harness.new_scene(8, 8, 2)
     material = harness.material("Missing")
     group = material.node_tree.nodes.new("ShaderNodeGroup")
     assert group.node_tree is None
@@ -90,6 +97,7 @@ def test_group_without_a_tree():
 
 
 def test_missing_library():
+    harness.new_scene(8, 8, 2)
     path = harness.TEMPORARY / "library.blend"
     bpy.data.libraries.write(str(path), {harness.emission(name="Linked")}, fake_user=True)
     with bpy.data.libraries.load(str(path), link=True) as (_, target):
@@ -98,11 +106,13 @@ def test_missing_library():
     _card(linked)
     _renders("a linked material")
     path.unlink()
-    linked.library.reload() if hasattr(linked.library, "reload") else None
+    with suppress(RuntimeError):
+        linked.library.reload()
     _renders("a missing library")
 
 
 def test_addon_disabled_and_enabled_between_renders():
+    harness.new_scene(8, 8, 2)
     _card(harness.emission((0.2, 0.4, 0.6)))
     module = harness.native()
     session = module.RenderSession(harness.exported(), 2)

@@ -60,7 +60,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     context.textures = textures;
     std::vector<SurfaceInteraction> hits(3);
     hits[1].p = Vec3(1e30f, -1e-30f, 3.0f);
-    hits[2].uv = Vec2(-7.5f, 1e9f);
+    hits[2].u = -7.5f;
+    hits[2].v = 1e9f;
     for (SurfaceInteraction& hit : hits) {
         hit.ns = hit.ng = hit.wo = Vec3(0, 0, 1);
     }
