@@ -106,13 +106,8 @@ same() {
     pass_or_fail "$status" "$1"
 }
 
-dump=${PHAROS_TEST_DUMP:-}
-if [ -z "$dump" ]; then
-    dump=$scratch/scene.pharos
-    "$root/build/release/tests/native/session_test" --gtest_filter='*WritesADumpForScripts*' >"$scratch/dump.log" 2>&1
-fi
-export PHAROS_DUMP_FOR_SCRIPTS=$dump
-[ -f "$dump" ] || "$root/build/release/tests/native/scene_test" --gtest_filter='DumpForScripts*' >"$scratch/dump.log" 2>&1
+dump=$scratch/scene.pharos
+PHAROS_WRITE_DUMP=$dump "$root/build/release/tests/native/session_test" --gtest_filter=Scripts.TakeADumpFromHere >/dev/null
 start_slurm
 pass_or_fail $? "slurm starts with one node of two slots"
 if [ "$failed" = 0 ]; then

@@ -11,6 +11,8 @@ format   clang-format of native/ and tests/native/
 native   the C++ unit tests (ctest without the label slow)
 blender  tests/blender in Blender 3.4.1, with and without a window, and in bpy 4.5
 render   scenes/render: two pictures, a second run without building, Ctrl-C and SIGTERM
+slurm    a Slurm of two slots renders shards of a picture; skipped where it is not installed
+fuzz     libFuzzer on dumps, node programs, images, weights and checkpoints, some seconds each
 tidy     clang-tidy; files seen before are not looked at again, within a budget of time
 asan     unit tests under the address and undefined-behaviour sanitizers
 tsan     tests of threads, integrator and session under the thread sanitizer
@@ -167,6 +169,24 @@ suite_blender() {
 
 suite_render() {
     counted render 900 "$PHAROS_ROOT/tests/render_command.sh"
+}
+
+suite_slurm() {
+    build_or_fail release session_test pharos-cli || return
+    counted slurm 300 bash "$PHAROS_ROOT/tests/slurm.sh"
+}
+
+# What a fuzzer finds lies in build/tests, to be run again by the same program.
+suite_fuzz() {
+    local target targets=(dump program image state)
+    build_or_fail fuzz "${targets[@]/#/fuzz_}" || return
+    for target in "${targets[@]}"; do
+        rm -rf "$LOGS/corpus_$target"
+        mkdir -p "$LOGS/corpus_$target"
+        ASAN_OPTIONS=detect_leaks=0 check "fuzz_$target" 180 \
+            "$PHAROS_ROOT/build/fuzz/tests/fuzz/fuzz_$target" "-max_total_time=${PHAROS_FUZZ_SECONDS:-10}" \
+            -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
+    done
 }
 
 suite_tidy() {

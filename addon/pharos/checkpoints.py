@@ -6,8 +6,8 @@ written to its file, or complete in Blender's Render Result.
 
 from __future__ import annotations
 
-import contextlib
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -31,7 +31,7 @@ def path_for(scene, layer: str, view: str) -> str:
     if not scene.pharos.use_checkpoint:
         return ""
     stem = _stem(scene, scene.frame_current)
-    with contextlib.suppress(OSError):  # the native part names the folder when it cannot write
+    with suppress(OSError):  # the native part names the folder when it cannot write
         stem.parent.mkdir(parents=True, exist_ok=True)
     parts = [stem.name, _word(layer), *([_word(view)] if view else [])]
     return str(stem.with_name(".".join(parts) + _SUFFIX))

@@ -129,7 +129,8 @@ class FinalRender:
         )
         try:
             self._poll(session, result)
-            self._show_result(session, result)
+            if session.progress().state != self._native.SessionState.Failed:
+                self._show_result(session, result)
             self._report.add_native(session.report())
             self._finish(session)
         finally:

@@ -6,6 +6,9 @@ namespace pharos {
 
 namespace {
 
+// A ray this close to the image plane lies in it; its square is still a number.
+constexpr float kMaxSlope = 1e15f;
+
 float finite_or(float value, float fallback) {
     return std::isfinite(value) ? value : fallback;
 }
@@ -74,6 +77,7 @@ Ray Camera::generate_ray(const Vec2& pixel, const Vec2& lens) const {
         start += offset;
         slope -= offset / focus_distance_;
     }
+    slope = glm::clamp(slope, -kMaxSlope, kMaxSlope);
     const float stretch = std::sqrt(1.0f + slope.x * slope.x + slope.y * slope.y);
     Ray ray;
     ray.direction = (right_ * slope.x + up_ * slope.y + forward_) * (1.0f / stretch);

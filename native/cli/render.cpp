@@ -219,8 +219,6 @@ void require_assets(const RenderSession& session) {
 
 // Waits for the end; a signal cancels. Returns the exit code of a render that has a picture.
 int wait_for_end(RenderSession& session, bool strict) {
-    std::signal(SIGINT, remember_signal);
-    std::signal(SIGTERM, remember_signal);
     while (!session.wait(std::chrono::milliseconds(50))) {
         if (received_signal != 0) {
             session.cancel();
@@ -282,6 +280,8 @@ void require_success(const RenderSession& session, const Options& options) {
 
 int render(const std::vector<std::string>& arguments) {
     Options options = parse(arguments);
+    std::signal(SIGINT, remember_signal);
+    std::signal(SIGTERM, remember_signal);
     using Clock = std::chrono::steady_clock;
     const Clock::time_point begin = Clock::now();
     SceneDescription description = load(options);
@@ -299,6 +299,9 @@ int render(const std::vector<std::string>& arguments) {
         std::fprintf(stderr, "pharos-cli: %s: %s\n", entry.object.c_str(), entry.message.c_str());
     }
     require_success(session, options);
+    if (code != 0 && session.progress().serial == 0) {
+        return code;  // before there was a picture
+    }
     write_picture(session, info, options.session.sample_offset, options.output);
     write_snapshots(session, options.output);
     if (!options.save_field.empty()) {

@@ -87,6 +87,11 @@ class AbandonedBuilds {
 // No threads= here: it would set the task scheduler's limit for the whole process, host included.
 EmbreeDevice::EmbreeDevice() : device(rtcNewDevice(nullptr)) {
     if (device == nullptr) {
+        // Its threads and their stacks are the first large things it asks for.
+        if (const RTCError error = rtcGetDeviceError(nullptr);
+            error == RTC_ERROR_OUT_OF_MEMORY || error == RTC_ERROR_UNKNOWN) {
+            throw std::bad_alloc();
+        }
         throw std::runtime_error("Embree cannot be started");
     }
     if (rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_VERSION) / 10000 != 3 ||

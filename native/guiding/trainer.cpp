@@ -317,8 +317,10 @@ void Trainer::publish_if_better(NetworkState& state, Team& team, TrainStatistics
                            std::span<float>(held_out_values_).subspan(task * values, values));
         });
     }
-    const double rescale =
-        static_cast<double>(state.published_scale) / static_cast<double>(state.radiance_scale);
+    // A field that has learned nothing yet has no unit: it is compared in the candidate's.
+    const double rescale = state.generation == 0 ? 1.0
+                                                 : static_cast<double>(state.published_scale) /
+                                                       static_cast<double>(state.radiance_scale);
     LossPair loss;
     for (std::size_t i = 0; i < set.size(); ++i) {
         const float* candidate =

@@ -118,10 +118,9 @@ std::optional<LampSample> sample_area_light(const Lamp& lamp, const Vec3& p, con
     const float cosine = view->height / distance;
     sample.pdf = spherical ? 1.0f / spherical->solid_angle
                            : distance2 / (cosine * sampled_area(lamp, *view));
-    if (is_zero(sample.L)) {
-        return std::nullopt;
-    }
-    return sample;
+    const bool usable =
+        distance2 > 0.0f && sample.pdf > 0.0f && sample.pdf < kInfinity && is_finite(sample.L);
+    return usable && !is_zero(sample.L) ? std::optional(sample) : std::nullopt;
 }
 
 float area_light_pdf(const Lamp& lamp, const Vec3& p, const Vec3& q) {
@@ -165,7 +164,8 @@ std::optional<LampHit> hit_area_light(const Lamp& lamp,
     if (context != nullptr) {
         result.pdf = area_light_pdf(lamp, context->p, lamp.center + q);
     }
-    return result;
+    // A spread too narrow for its density is seen by nobody.
+    return is_finite(result.L) && result.pdf >= 0.0f ? std::optional(result) : std::nullopt;
 }
 
 }  // namespace pharos

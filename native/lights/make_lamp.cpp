@@ -10,6 +10,9 @@ namespace {
 // Bulbs this small cannot be met by a float32 ray and would overflow their radiance.
 constexpr float kMinRadius = 1e-7f;
 
+// Of sizes and positions: their squares, and sums of them, are numbers.
+constexpr float kLargest = 1e15f;
+
 float finite_or(float value, float fallback) {
     return std::isfinite(value) ? value : fallback;
 }
@@ -38,7 +41,7 @@ SpotCone make_cone(const LightDescription& d, std::uint32_t version) {
 }
 
 bool make_bulb(const LightDescription& d, std::uint32_t version, Lamp& lamp) {
-    const float radius = std::max(finite_or(d.radius, 0.0f), 0.0f);
+    const float radius = std::clamp(finite_or(d.radius, 0.0f), 0.0f, kLargest);
     lamp.radiance = d.strength * (0.25f * kInvPi);
     if (d.type == LightType::Spot) {
         lamp.cone = make_cone(d, version);
@@ -99,6 +102,9 @@ bool make_area(const LightDescription& d, std::uint32_t version, Lamp& lamp) {
     }
     lamp.half_u = 0.5f * glm::length(side_u);
     lamp.half_v = 0.5f * glm::length(side_v);
+    if (!(std::max(lamp.half_u, lamp.half_v) <= kLargest)) {
+        return false;
+    }
     const float skew = glm::dot(lamp.frame.x, lamp.frame.y);
     lamp.orthogonal = std::abs(skew) < 1e-4f;
     const float inverse = 1.0f / (1.0f - skew * skew);
@@ -118,7 +124,9 @@ bool make_area(const LightDescription& d, std::uint32_t version, Lamp& lamp) {
 }
 
 bool make_sun(const LightDescription& d, std::uint32_t version, Lamp& lamp) {
-    lamp.center = normalize_or(Vec3(d.to_world[2]), Vec3(0, 0, 1));
+    const Vec3 axis = Vec3(d.to_world[2]);
+    const float size = max_component(glm::abs(axis));  // so that the square is a number
+    lamp.center = normalize_or(size > 0.0f ? axis / size : Vec3(0.0f), Vec3(0, 0, 1));
     lamp.frame = Frame::from_z(lamp.center);
     lamp.radiance = d.strength;
     const float angle = std::clamp(finite_or(d.angle, 0.0f), 0.0f, kPi);
@@ -158,7 +166,7 @@ std::optional<Lamp> make_lamp(const LightDescription& d,
     lamp.index = index;
     lamp.program = d.program;
     lamp.center = Vec3(d.to_world[3]);
-    bool shines = is_finite(lamp.center);
+    bool shines = max_component(glm::abs(lamp.center)) <= kLargest;  // false for NaN
     switch (d.type) {
         case LightType::Point:
         case LightType::Spot:

@@ -20,6 +20,7 @@
 #include "scene/scene_hash.h"
 #include "session/field_file.h"
 #include "session/guide_controller.h"
+#include "session/memory_estimate.h"
 #include "session/pass_schedule.h"
 
 namespace pharos {
@@ -201,6 +202,9 @@ void RenderSession::Impl::run(SceneDescription description) {
         }
         SceneReport build_report;
         const Clock::time_point begin = Clock::now();
+        if (estimate_memory(description) > available_memory()) {
+            throw std::bad_alloc();
+        }
         const RenderIdentity identity = identify(description, options);
         const auto scene = build_scene(std::move(description), cancel, build_report);
         {

@@ -2,9 +2,12 @@
 
 #include "camera/camera.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "support/random.h"
+#include "support/stress.h"
 
 namespace pharos {
 
@@ -185,6 +188,40 @@ TEST(Camera, BadDescriptionsGiveFiniteRays) {
             }
         }
     }
+}
+
+// Extremes that scene building lets pass: rays are numbers, and their clip range is one.
+TEST(Camera, AnyParametersGiveRays) {
+    constexpr std::array<float, 10> kExtremes{
+        0.0f, 1e-20f, 1e-7f, 1e-3f, 0.5f, 1.0f, 100.0f, 1e6f, 1e15f, 1e20f};
+    const std::uint64_t tries = testing::case_count(100000, 10000000);
+    std::uint64_t bad = 0;
+    Random random(8);
+    for (std::uint64_t i = 0; i < tries; i += 10) {
+        const auto wild = [&] {
+            return random.index(2) == 0 ? random.uniform(0.0f, 3.0f) : kExtremes[random.index(10)];
+        };
+        CameraDescription d = describe(static_cast<CameraType>(random.index(2)));
+        d.lens_radius = wild();
+        d.focus_distance = wild();
+        d.aperture_ratio = wild();
+        d.aperture_blades = random.index(12);
+        d.aperture_rotation = wild();
+        d.near_clip = wild();
+        d.far_clip = wild();
+        d.window_upper = d.window_lower + Vec2(wild(), wild());
+        const Camera camera(d, 1 + random.index(4000), 1 + random.index(4000));
+        for (int k = 0; k < 10; ++k) {
+            const Ray ray = camera.generate_ray(random.uniform2() * 4000.0f, random.uniform2());
+            const bool good = is_finite(ray.origin) &&
+                              std::abs(length_squared(ray.direction) - 1.0f) < 1e-4f &&
+                              ray.t_min >= 0.0f && ray.t_max >= 0.0f;
+            bad += good ? 0 : 1;
+            EXPECT_TRUE(good) << "case " << i + static_cast<std::uint64_t>(k);
+        }
+        ASSERT_LT(bad, 5u);
+    }
+    testing::say_stress("camera: rays that are none", tries, static_cast<double>(bad), 0.0);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 // Mixtures of vMF lobes: sampling against density, the closed-form product, extreme lobes.
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "guiding/roulette.h"
 #include "support/chi_square.h"
 #include "support/random.h"
+#include "support/stress.h"
 
 namespace pharos {
 namespace {
@@ -209,6 +211,46 @@ TEST(Roulette, WeightsAreOneInTheMean) {
         EXPECT_EQ(d.copies, 1);
         EXPECT_EQ(d.weight, 1.0f);
     }
+}
+
+// Lobes of any sharpness and weight, multiplied, sampled and asked.
+TEST(Mixture, AnyLobesGiveDensities) {
+    const std::uint64_t tries = testing::case_count(300000, 10000000);
+    std::uint64_t bad = 0;
+    Random random(77);
+    for (std::uint64_t i = 0; i < tries; i += 10) {
+        VmfMixture mixture;
+        mixture.lobe_count = 1 + static_cast<int>(random.index(8));
+        float sum = 0.0f;
+        std::array<float, 8> weight{};
+        for (int k = 0; k < mixture.lobe_count; ++k) {
+            weight[static_cast<std::size_t>(k)] =
+                random.index(3) == 0 ? 0.0f : random.log_uniform(1e-30f, 1.0f);
+            sum += weight[static_cast<std::size_t>(k)];
+        }
+        weight[0] = sum > 0.0f ? weight[0] : 1.0f;
+        sum = sum > 0.0f ? sum : 1.0f;
+        for (int k = 0; k < mixture.lobe_count; ++k) {
+            const float kappa = random.index(8) == 0 ? 0.0f : random.log_uniform(1e-6f, 3e4f);
+            set_lobe(
+                mixture, k, weight[static_cast<std::size_t>(k)] / sum, {random.direction(), kappa});
+        }
+        if (random.index(2) == 0) {
+            mixture = multiply_lobe(mixture, random.direction(), random.log_uniform(1e-3f, 3e4f));
+        }
+        for (int k = 0; k < 10; ++k) {
+            const Vec3 w = sample_mixture(mixture, random.uniform(), random.uniform2());
+            const float pdf = mixture_pdf(mixture, w);
+            const float other = mixture_pdf(mixture, random.direction());
+            const bool good = std::abs(length_squared(w) - 1.0f) < 1e-4f && pdf > 0.0f &&
+                              std::isfinite(pdf) && other >= 0.0f && std::isfinite(other);
+            bad += good ? 0 : 1;
+            EXPECT_TRUE(good) << "case " << i + static_cast<std::uint64_t>(k) << " pdf " << pdf;
+        }
+        ASSERT_LT(bad, 5u);
+    }
+    testing::say_stress(
+        "vMF mixtures and products: densities that are none", tries, static_cast<double>(bad), 0.0);
 }
 
 }  // namespace

@@ -3,11 +3,15 @@
 
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "core/color.h"
+#include "support/random.h"
+#include "support/stress.h"
 
 namespace pharos {
 namespace {
@@ -331,6 +335,61 @@ TEST(Texture, BatchesEqualSingleLookups) {
             }
         }
     }
+}
+
+// Coordinates of any size, images of any depth and shape: no look-up leaves the texels' range.
+TEST(Texture, AnyCoordinatesGiveTexels) {
+    const std::uint64_t tries = testing::case_count(400000, 20000000);
+    constexpr float kExtremes[] = {0.0f,
+                                   -0.0f,
+                                   1.0f,
+                                   1e-30f,
+                                   -1e-7f,
+                                   0.99999994f,
+                                   1e9f,
+                                   -1e30f,
+                                   3e38f,
+                                   std::numeric_limits<float>::infinity(),
+                                   NAN};
+    std::uint64_t bad = 0;
+    test::Random random(31);
+    for (std::uint64_t i = 0; i < tries; i += 200) {
+        const std::uint32_t width = 1 + random.index(9);
+        const std::uint32_t height = 1 + random.index(9);
+        const std::uint32_t channels = 1 + random.index(4);
+        TexturePixels pixels{width, height, channels, static_cast<TexelType>(random.index(4)), {}};
+        pixels.data.resize(std::size_t{width} * height * channels * texel_bytes(pixels.type));
+        for (std::size_t k = 0; k < pixels.data.size(); ++k) {
+            // Floats and halves between 0 and 2; others as they come.
+            const bool top = pixels.type == TexelType::Float ? k % 4 == 3 : k % 2 == 1;
+            pixels.data[k] = pixels.type == TexelType::Half || pixels.type == TexelType::Float
+                                 ? static_cast<std::uint8_t>(top ? 0x3c : 0)
+                                 : static_cast<std::uint8_t>(random.index(256));
+        }
+        const auto alpha = static_cast<ImageAlpha>(random.index(4));
+        const Texture texture(
+            std::move(pixels), static_cast<ImageColorSpace>(random.index(3)), alpha);
+        // Colours over their alpha are not those of a picture, but numbers.
+        const float most = alpha == ImageAlpha::Premultiplied ? 1e8f : 2.0f;
+        for (int k = 0; k < 200; ++k) {
+            const auto wild = [&] {
+                return random.index(2) == 0 ? random.uniform(-3.0f, 3.0f)
+                                            : kExtremes[random.index(std::size(kExtremes))];
+            };
+            const Vec4 rgba = texture.lookup(Vec2(wild(), wild()),
+                                             kInterpolations[random.index(3)],
+                                             kExtensions[random.index(4)]);
+            bool good = true;
+            for (int c = 0; c < 4; ++c) {
+                good = good && rgba[c] >= 0.0f && rgba[c] <= most;
+            }
+            bad += good ? 0 : 1;
+            EXPECT_TRUE(good) << "case " << i + static_cast<std::uint64_t>(k);
+        }
+        ASSERT_LT(bad, 5u);
+    }
+    testing::say_stress(
+        "textures: outside of their texels' range", tries, static_cast<double>(bad), 0.0);
 }
 
 }  // namespace

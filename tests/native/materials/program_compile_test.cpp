@@ -7,6 +7,7 @@
 
 #include "materials/closure_setup.h"
 #include "program_support.h"
+#include "support/stress.h"
 
 namespace pharos {
 namespace {
@@ -510,9 +511,10 @@ TEST(ProgramCompile, RandomProgramsNeverCrash) {
     std::vector<Vec3> directions = {Vec3(0, 0, 1), Vec3(NAN), Vec3(0.0f)};
     std::vector<Rgb> radiance(directions.size());
     Surfaces surfaces;
-    int accepted = 0;
-    int varying = 0;
-    for (int i = 0; i < 100000; ++i) {
+    std::uint64_t accepted = 0;
+    std::uint64_t varying = 0;
+    const std::uint64_t tries = testing::case_count(100000, 3000000);
+    for (std::uint64_t i = 0; i < tries; ++i) {
         context.blender_version = i % 2 == 0 ? 304 : 405;
         SceneReport report;
         const Material material = compile_material(
@@ -532,8 +534,9 @@ TEST(ProgramCompile, RandomProgramsNeverCrash) {
         ASSERT_TRUE(is_finite(radiance[1]));
     }
     // Enough of them are whole for the test to mean something.
-    EXPECT_GT(accepted, 20000);
-    EXPECT_GT(varying, 5000);
+    EXPECT_GT(accepted, tries / 5);
+    EXPECT_GT(varying, tries / 20);
+    testing::say_stress("node programs: crashes, not finite", tries, 0.0, 0.0);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "session/render_session.h"
 #include "support/scratch.h"
+#include "support/stress.h"
 #include "support/test_scenes.h"
 
 namespace pharos {
@@ -236,6 +237,10 @@ TEST(Checkpoint, SurvivesKillsAtRandomMoments) {
     wait(resumed);
     const Picture picture = all_passes(resumed);
     EXPECT_EQ(picture, uninterrupted(d).picture);
+    say_stress("kill -9 while checkpoints are written: torn or lost files",
+               static_cast<std::uint64_t>(kills),
+               0.0,
+               0.0);
 }
 
 }  // namespace

@@ -1,0 +1,282 @@
+"""The attacks of tests/stress: runs programs that say `STRESS what|cases|worst|bar`, and tells all.
+
+A program that ends badly is a row of its own, so that nothing is lost in silence.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+NATIVE = ROOT / "build" / "release" / "tests" / "native"
+CLI = ROOT / "build" / "release" / "native" / "pharos-cli"
+LOGS = ROOT / "build" / "stress"
+FUZZERS = ("dump", "program", "image", "state")
+NUMBERS = {
+    "film": "Film.AMillion*",
+    "camera": "Camera.Any*",
+    "image": "Texture.Any*",
+    "lights": "Lights.Any*",
+    "guiding": "Mixture.Any*:Vmf.PdfError*",
+    "materials": "Robustness.Million*:ProgramCompile.Random*",
+    "session": "Scaling.*",
+}
+
+
+class Table:
+    """Rows as they come; each is printed at once."""
+
+    def __init__(self):
+        self.broken = 0
+
+    def add(self, attack: str, what: str, cases: str, worst: float, bar: float) -> None:
+        kept = worst <= bar
+        self.broken += not kept
+        print(f"{attack:8} {what:66} {cases:>10} {worst:>10.3g} {bar:>8.3g} "
+              f"{'' if kept else 'BROKEN'}", flush=True)
+
+    def take(self, attack: str, text: str) -> int:
+        rows = [line[7:] for line in text.splitlines() if line.startswith("STRESS ")]
+        for row in rows:
+            what, cases, worst, bar = row.split("|")
+            self.add(attack, what, cases, float(worst), float(bar))
+        return len(rows)
+
+
+def run(table: Table, attack: str, name: str, command: list, timeout: float, **variables) -> None:
+    """A program's rows; one more where it failed or said nothing."""
+    try:
+        done = subprocess.run(
+            [str(word) for word in command], env={**os.environ, **variables}, timeout=timeout,
+            capture_output=True, text=True, errors="replace", check=False,
+            start_new_session=True)
+        text, code = done.stdout + done.stderr, done.returncode
+    except subprocess.TimeoutExpired as expired:
+        text = "".join(part.decode(errors="replace") for part in (expired.stdout, expired.stderr)
+                       if part)
+        code = "no end"
+    (LOGS / f"{attack}_{name}.log").write_text(text, encoding="utf-8")
+    if table.take(attack, text) == 0 or code != 0:
+        table.add(attack, f"{name}: ended with {code}", "1", 0 if code == 0 else 1, 0)
+
+
+def gtest(table: Table, attack: str, module: str, tests: str, **variables) -> None:
+    command = [NATIVE / f"{module}_test", f"--gtest_filter={tests}", "--gtest_brief=1"]
+    run(table, attack, module, command, 1500, **variables)
+
+
+def numbers(table: Table) -> None:
+    for module, tests in NUMBERS.items():
+        gtest(table, "numbers", module, tests, PHAROS_LONG_TESTS="1")
+
+
+def kills(table: Table) -> None:
+    gtest(table, "kills", "session", "Checkpoint.Survives*", PHAROS_KILLS="100")
+
+
+def sizes(table: Table) -> None:
+    gtest(table, "sizes", "session", "LargeScenes.*", PHAROS_LONG_TESTS="1")
+
+
+def cancel(table: Table) -> None:
+    gtest(table, "cancel", "session", "Cancel.*", PHAROS_LONG_TESTS="1")
+
+
+def blender_script(table: Table, attack: str, script: str, **variables) -> None:
+    """In Blender itself, not through run_all.py, whose lines are its own."""
+    path = ROOT / "tests" / "blender" / script
+    start = (f"import sys; sys.path.insert(0, {str(path.parent)!r}); "
+             f"exec(compile(open({str(path)!r}).read(), {str(path)!r}, 'exec'), "
+             f"{{'__name__': '__main__'}})")
+    command = [os.environ["BLENDER"], "-b", "--factory-startup", "-Y", "--python-exit-code", "3",
+               "--python-expr", start]
+    run(table, attack, script.removesuffix(".py"), command, 1500, **variables)
+
+
+def soak(table: Table) -> None:
+    blender_script(table, "soak", "test_soak.py", PHAROS_SOAK="1")
+    blender_script(table, "soak", "test_robustness.py")
+
+
+def write_scene(folder: Path) -> Path:
+    path = folder / "scene.pharos"
+    subprocess.run([NATIVE / "session_test", "--gtest_filter=Scripts.TakeADumpFromHere"],
+                   env={**os.environ, "PHAROS_WRITE_DUMP": str(path)}, check=True,
+                   capture_output=True)
+    return path
+
+
+def limited(gigabytes: float):
+    def limit() -> None:
+        size = int(gigabytes * 2**30)
+        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+    return limit
+
+
+_MEMORY_SCENE = """
+import sys, os, time; sys.path.insert(0, {tests!r})
+import resource, bpy, harness
+harness.enable_addon()
+def card(side):
+    scene = harness.new_scene(side, side, 1)
+    harness.add_camera()
+    harness.add_object(harness.plane_mesh(half=10.0), harness.emission((0.2, 0.4, 0.6)))
+card(64)
+used = int(open('/proc/self/statm').read().split()[0]) * 4096
+resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 30), used + (1 << 30)))
+card(16384)
+began = time.monotonic()
+try:
+    bpy.ops.render.render()
+    message = ''
+except RuntimeError as error:
+    message = str(error)
+seconds = time.monotonic() - began
+card(32)
+alive = harness.close(harness.render()[..., :3], (0.2, 0.4, 0.6), 1e-5)
+harness.say(f'STRESS Blender under ulimit -v, 16k x 16k: seconds to the message|1|{{seconds}}|5')
+wrong = int('Out of memory' not in message) + int(not alive)
+harness.say(f'STRESS its message is none, or the next render wrong|2|{{wrong}}|0')
+os._exit(0)
+"""
+
+
+def memory(table: Table) -> None:
+    """A picture that does not fit into what the process may take."""
+    with tempfile.TemporaryDirectory() as name:
+        scene, folder = write_scene(Path(name)), Path(name)
+        wrong = 0
+        for gigabytes in (0.55, 0.6, 1.0):
+            done = subprocess.run([CLI, "render", scene, "-o", folder / "x.exr", "--threads", "1"],
+                                  preexec_fn=limited(gigabytes), capture_output=True, check=False,
+                                  timeout=60)
+            # Either it fits or it says that it does not.
+            wrong += done.returncode not in (0, 4) or (done.returncode == 4) != (
+                b"memory" in done.stderr)
+        table.add("memory", "pharos-cli under ulimit -v: neither a picture nor a message", "3",
+                  wrong, 0)
+        script = folder / "memory.py"
+        script.write_text(_MEMORY_SCENE.format(tests=str(ROOT / "tests" / "blender")),
+                          encoding="utf-8")
+        run(table, "memory", "blender", [os.environ["BLENDER"], "-b", "--factory-startup", "-Y",
+                                         "--python-exit-code", "3", "--python", script], 120)
+
+
+def _wait_for_handler(pid: int, number: int) -> None:
+    """Loading the libraries takes a second; only then the program catches signals itself."""
+    for _ in range(200):
+        time.sleep(0.1)
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+        caught = next(line for line in status.splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) >> (number - 1) & 1:
+            time.sleep(0.5)
+            return
+
+
+def _code(*arguments, cut_by: int = 0) -> int:
+    process = subprocess.Popen([str(word) for word in (CLI, *arguments)],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    if cut_by:
+        _wait_for_handler(process.pid, cut_by)
+        process.send_signal(cut_by)
+    return process.wait(60)
+
+
+def exits(table: Table) -> None:
+    """Exit codes, each as the README says."""
+    with tempfile.TemporaryDirectory() as name:
+        scene, out = write_scene(Path(name)), Path(name) / "out.exr"
+        broken = Path(name) / "broken.pharos"
+        broken.write_bytes(scene.read_bytes()[:-100])
+        forever = ("--samples", "10000000")
+        cases = (
+            (0, (scene, "-o", out)),
+            (1, (broken, "-o", out)),
+            (1, ("/nowhere", "-o", out)),
+            (2, (scene, "-o", out, "--no-such", "1")),
+            (2, (scene, "-o", out, "--samples", "x")),
+            (5, (scene, "-o", "/nowhere/x.exr")),
+            (130, (scene, "-o", out, *forever)),
+            (143, (scene, "-o", out, *forever)),
+        )
+        signals = {130: signal.SIGINT, 143: signal.SIGTERM}
+        wrong = []
+        for expected, arguments in cases:
+            code = _code("render", *arguments, cut_by=signals.get(expected, 0))
+            if code != expected:
+                wrong.append(f"{code} for {expected}")
+        table.add("exits", f"exit codes that are others {wrong or ''}", str(len(cases)),
+                  len(wrong), 0)
+
+
+def scenes(table: Table) -> None:
+    """Dropped samples over the project's own scenes."""
+    with tempfile.TemporaryDirectory() as name:
+        files = sorted((ROOT / "scenes").glob("*.blend"))
+        dropped, looked = 0, 0
+        for file in files:
+            dump, stats = Path(name) / f"{file.stem}.pharos", Path(name) / "stats.json"
+            subprocess.run([os.environ["BLENDER"], "-b", "--factory-startup", "-Y", "--addons",
+                            "pharos", file, "--", "--pharos-dump", dump], check=False,
+                           capture_output=True, timeout=120)
+            for guiding in ("off", "neural", "slides"):
+                done = subprocess.run(
+                    [CLI, "render", dump, "-o", Path(name) / "x.exr", "--samples", "8",
+                     "--guiding", guiding, "--stats-json", stats], capture_output=True,
+                    check=False, timeout=600)
+                looked += 1
+                text = stats.read_text(encoding="utf-8") if done.returncode == 0 else ""
+                dropped += not text or '"nonfinite_samples": 0,' not in text
+        table.add("scenes", "renders of our scenes with samples that are no numbers", str(looked),
+                  dropped, 0)
+
+
+def fuzz(table: Table, seconds: int) -> None:
+    for name in FUZZERS:
+        corpus = LOGS / f"corpus_{name}"
+        shutil.rmtree(corpus, ignore_errors=True)
+        corpus.mkdir(parents=True)
+        command = [ROOT / "build" / "fuzz" / "tests" / "fuzz" / f"fuzz_{name}",
+                   f"-max_total_time={seconds}", "-rss_limit_mb=4096", "-timeout=25",
+                   "-print_final_stats=1", f"-artifact_prefix={LOGS}/{name}_", corpus]
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
+                              errors="replace", check=False, timeout=seconds + 300,
+                              env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0"})
+        (LOGS / f"fuzz_{name}.log").write_text(done.stderr, encoding="utf-8")
+        runs = [line.split()[-1] for line in done.stderr.splitlines()
+                if line.startswith("stat::number_of_executed_units")]
+        table.add("fuzz", f"{name}, {seconds} s: findings", runs[0] if runs else "?",
+                  int(done.returncode != 0), 0)
+
+
+ATTACKS = {f.__name__: f for f in (numbers, kills, sizes, cancel, soak, memory, exits, scenes)}
+
+
+def main() -> int:
+    chosen = sys.argv[1:]
+    unknown = [name for name in chosen if name not in (*ATTACKS, "fuzz")]
+    if unknown:
+        print(f"no attack {unknown[0]}; there are: {' '.join(ATTACKS)} fuzz", file=sys.stderr)
+        return 2
+    table = Table()
+    print(f"{'attack':8} {'what was tried':66} {'cases':>10} {'worst':>10} {'bar':>8}", flush=True)
+    began = time.monotonic()
+    for name in chosen or ATTACKS:
+        if name != "fuzz":
+            ATTACKS[name](table)
+    if not chosen or "fuzz" in chosen:
+        fuzz(table, int(os.environ.get("FUZZ_SECONDS", "600" if chosen else "60")))
+    print(f"{table.broken} broken, {(time.monotonic() - began) / 60:.0f} minutes", flush=True)
+    return 1 if table.broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
