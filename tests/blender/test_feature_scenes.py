@@ -45,11 +45,11 @@ def _yard(make=lambda: _shaded(Color=_TINT)[0], sky=(0.25, 0.35, 0.5)):
     cycles.caustics_reflective = cycles.caustics_refractive = True
     for name in ("max", "diffuse", "glossy", "transmission"):
         setattr(cycles, f"{name}_bounces", 4)
-    scene.pharos.follow_cycles = True
     harness.add_camera(location=(0.0, -4.0, 2.2), rotation=(1.1, 0.0, 0.0))
     grey = _shaded(Color=(0.6, 0.6, 0.6, 1.0))[0]
     harness.add_object(harness.plane_mesh("Floor", half=3.0), grey)
-    block = harness.add_object(harness.cube_mesh("Block"), make(), location=(0.0, 0.3, 0.7))
+    # Off the floor: Cycles loses paths that start on two faces at one place.
+    block = harness.add_object(harness.cube_mesh("Block"), make(), location=(0.0, 0.3, 0.75))
     block.scale, block.rotation_euler = (0.7, 0.6, 0.7), (0.0, 0.0, 0.5)
     harness.set_world(sky)
     return block
@@ -74,6 +74,7 @@ def _difference(theirs: np.ndarray, ours: np.ndarray) -> tuple[float, float]:
 
 
 def _check(name: str, samples: int = 256) -> None:
+    bpy.context.scene.pharos.follow_cycles = True
     theirs, ours = (_seeds_of(engine, samples).mean(axis=-1) for engine in ("CYCLES", "PHAROS"))
     bpy.context.scene.pharos.follow_cycles = False
     whole, error = _difference(theirs.mean(axis=(1, 2)), ours.mean(axis=(1, 2)))
@@ -123,6 +124,7 @@ def test_lobes():
     for kind, inputs in (
         ("ShaderNodeBsdfGlossy", {"Roughness": 0.3}),
         ("ShaderNodeBsdfGlass", {"Roughness": 0.4, "IOR": 1.4}),
+        ("ShaderNodeBsdfTranslucent", {}),
         ("ShaderNodeBsdfPrincipled", {"Metallic": 0.4, "Roughness": 0.35}),
     ):
         name = "Base_Color" if kind.endswith("Principled") else "Color"

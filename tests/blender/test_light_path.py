@@ -36,6 +36,8 @@ def _shaders():
     for kind, inputs in kinds.items():
         owner = harness.material(kind)
         shader = harness.node(owner, kind, Color=(0.8, 0.8, 0.8, 1.0), **inputs)
+        if hasattr(shader, "distribution"):
+            shader.distribution = "GGX"
         harness.connect(owner, shader.outputs[0], harness.surface(owner))
         yield owner
 

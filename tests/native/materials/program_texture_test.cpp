@@ -269,7 +269,7 @@ TEST(ProgramTexture, TilesAreFoundByTheirNumber) {
     b.program.images = {use};
     b.show(b.add(NodeOpCode::Image, 0, {b.geometry(GeometryOutput::Position)}, 4));
     std::vector<SurfaceInteraction> hits(5);
-    const Vec2 places[] = {{0.3f, 0.6f}, {2.3f, 1.6f}, {1.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, 2e9f}};
+    const Vec2 places[] = {{0.3f, 0.6f}, {2.3f, 1.6f}, {1.5f, 0.5f}, {-1.5f, 0.5f}, {0.5f, 2e9f}};
     for (std::size_t i = 0; i < hits.size(); ++i) {
         hits[i].p = Vec3(places[i], 0.0f);
         hits[i].ns = hits[i].ng = hits[i].wo = Vec3(0, 0, 1);
