@@ -115,9 +115,11 @@ def test_vertices_go_where_cycles_moves_them():
 
 
 def test_displacement_with_bump():
-    """What vertices cannot hold is missing here: these heights they can."""
+    """Vertices move, what they cannot hold is missing and named: a third of a block at most."""
     _scene("BOTH", True, _heights, "OBJECT", 64)
-    _compare("both", 0.4)
+    from pharos.export.nodes import NO_BUMP_BESIDE_DISPLACEMENT
+
+    _compare("both", 0.4, [f"Material: {NO_BUMP_BESIDE_DISPLACEMENT}"])
 
 
 def test_what_is_not_moved_is_named():

@@ -28,6 +28,11 @@ class Flattened(NamedTuple):
     instance_attributes: frozenset = frozenset()
 
 
+NO_BUMP_BESIDE_DISPLACEMENT = (
+    "Displacement moves the vertices; what lies between them is not shown as bumps."
+)
+
+
 class Flattener:
     """One node tree on its way to a program: the context that node handlers work in."""
 
@@ -255,6 +260,8 @@ def flatten_displacement(native, images, report, material) -> Flattened | None:
         return None  # flatten_material() names it
     if value is None:
         return None
+    if compat.displacement_method(material) == "BOTH":
+        flattener.warn(NO_BUMP_BESIDE_DISPLACEMENT)
     mode = native.DISPLACE_IN_WORLD if node.space == "WORLD" else 0
     flattener.program.closure(code, [value], mode)
     return flattener.result()
