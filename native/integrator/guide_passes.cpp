@@ -100,7 +100,7 @@ void Integrator::render_guide_passes(const GuidingContext& guiding, SharedFilm& 
     const RenderContext context{scene_, camera_, filter_, PassSettings{}, asking, passes_};
     pool_.parallel_for(batches_per_sample(), [&](std::size_t index, unsigned thread) {
         Worker& worker = *workers_[thread];
-        timed(worker.statistics, Stage::WritePasses, [&] {
+        worker.timed(Stage::WritePasses, [&] {
             return render_guide_batch(
                 context, static_cast<std::uint32_t>(index) * kBatchPaths, worker, film);
         });

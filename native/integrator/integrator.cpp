@@ -67,9 +67,8 @@ void Integrator::render_batch(const RenderContext& context,
                               Worker& worker) const {
     PathBatch& batch = worker.batch;
     BatchStatistics& statistics = worker.statistics;
-    timed(statistics, Stage::GenerateCameraRays, [&] {
-        return generate_camera_rays(context, work, batch);
-    });
+    worker.timed(Stage::GenerateCameraRays,
+                 [&] { return generate_camera_rays(context, work, batch); });
     batch.root_passes.assign(std::size_t{work.pixels} * context.passes.sample_size(), 0.0f);
     statistics.camera_samples += work.pixels;
     follow_paths(context, worker);
@@ -82,42 +81,29 @@ void Integrator::follow_paths(const RenderContext& context, Worker& worker) cons
     split.begin(context, batch);
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
-        timed(
-            statistics, Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
-        timed(
-            statistics, Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
-        timed(statistics, Stage::AddEscapedRadiance, [&] {
-            return add_escaped_radiance(context, batch);
-        });
-        timed(statistics, Stage::EvaluateMaterials, [&] {
-            return evaluate_materials(context, batch);
-        });
+        worker.timed(Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
+        worker.timed(Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
+        worker.timed(Stage::AddEscapedRadiance,
+                     [&] { return add_escaped_radiance(context, batch); });
+        worker.timed(Stage::EvaluateMaterials, [&] { return evaluate_materials(context, batch); });
         statistics.vertices += batch.surfaces.size();
-        timed(statistics, Stage::AddEmittedRadiance, [&] {
-            return add_emitted_radiance(context, batch);
-        });
-        timed(statistics, Stage::WritePasses, [&] {
+        worker.timed(Stage::AddEmittedRadiance,
+                     [&] { return add_emitted_radiance(context, batch); });
+        worker.timed(Stage::WritePasses, [&] {
             split.take_hits(context, batch);
             return write_passes(context, batch);
         });
-        timed(statistics, Stage::QueryGuidingField, [&] {
-            return query_guiding_field(context, batch);
-        });
-        timed(statistics, Stage::SampleDirectLight, [&] {
-            return sample_direct_light(context, batch);
-        });
+        worker.timed(Stage::QueryGuidingField, [&] { return query_guiding_field(context, batch); });
+        worker.timed(Stage::SampleDirectLight, [&] { return sample_direct_light(context, batch); });
         statistics.rays += batch.shadow_rays.size();
         split.before_shadow_rays(context, batch);
-        timed(
-            statistics, Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
+        worker.timed(Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
         split.after_shadow_rays(context, batch);
-        timed(
-            statistics, Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
+        worker.timed(Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
         split.take_directions(context, batch);
     }
-    timed(statistics, Stage::RecordRadiance, [&] {
-        return record_radiance(context, batch, worker.records);
-    });
+    worker.timed(Stage::RecordRadiance,
+                 [&] { return record_radiance(context, batch, worker.records); });
     statistics.nonfinite += finish_paths(batch);
 }
 
@@ -191,7 +177,7 @@ bool Integrator::render_pass(const PassSettings& pass,
             }
             const std::uint32_t sample = pass.offset + pass.first_sample + i;
             render_batch(context, {first, count, sample}, worker);
-            timed(worker.statistics, Stage::AccumulateFilm, [&] {
+            worker.timed(Stage::AccumulateFilm, [&] {
                 const std::shared_lock lock(film.mutex);
                 add_to_film(worker.batch, pass, {first, count, sample}, passes_, film.film);
                 return count;

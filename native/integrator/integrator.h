@@ -92,7 +92,7 @@ class Integrator {
     Camera camera_;
     FilterSampler filter_;
     std::vector<std::unique_ptr<Worker>> workers_;
-    StageCounter training_;
+    WorkCounter training_;
     BatchStatistics total_;
 };
 

@@ -1,9 +1,9 @@
 // What one thread of the integrator owns, for the integrator's own sources.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 
+#include "core/work_counter.h"
 #include "integrator/integrator.h"
 #include "integrator/light_split.h"
 #include "integrator/path_batch.h"
@@ -18,21 +18,17 @@ struct Integrator::Worker {
     LightSplit split;
     BatchStatistics statistics;
     RecordBuffer records;
+
+    // Runs a stage and books its items and time; what it spent inside other stages is theirs.
+    template <class Function>
+    void timed(Stage stage, const Function& function) {
+        count_work(statistics[stage], function);
+        const WorkCounter textures = batch.scratch.textures.take();
+        const WorkCounter transmission = batch.transmission.take();
+        statistics[Stage::EvaluateTextures].add(textures);
+        statistics[Stage::TransmitShadowRays].add(transmission);
+        statistics[stage].nanoseconds -= textures.nanoseconds + transmission.nanoseconds;
+    }
 };
-
-[[nodiscard]] inline std::uint64_t nanoseconds_now() {
-    return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                          std::chrono::steady_clock::now().time_since_epoch())
-                                          .count());
-}
-
-// Runs a stage and books its items and time.
-template <class Function>
-void timed(BatchStatistics& statistics, Stage stage, const Function& function) {
-    const std::uint64_t begin = nanoseconds_now();
-    StageCounter& counter = statistics[stage];
-    counter.items += function();
-    counter.nanoseconds += nanoseconds_now() - begin;
-}
 
 }  // namespace pharos

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "core/work_counter.h"
 #include "film/film.h"
 #include "geometry/accelerator.h"
 #include "geometry/surface_interaction.h"
@@ -130,6 +131,7 @@ struct PathBatch {
     std::vector<std::uint32_t> shadow_places;  // of each, into shadow_rays
     std::vector<std::uint32_t> shadow_order;   // by material
     std::vector<Rgb> transmittances;
+    WorkCounter transmission;  // at transparent surfaces, since somebody asked
     std::vector<PendingLight> pending_triangles;
     std::vector<PendingLight> pending_lamps;  // those with a program; the emitter's material is it
     std::vector<PendingLight> pending_worlds;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "camera/camera.h"
+#include "core/work_counter.h"
 #include "film/filter.h"
 #include "film/passes.h"
 #include "integrator/guiding_context.h"
@@ -40,11 +41,13 @@ enum class Stage : std::uint8_t {
     AddLampRadiance,
     AddEscapedRadiance,
     EvaluateMaterials,
+    EvaluateTextures,  // within other stages, whose time is without it
     AddEmittedRadiance,
     WritePasses,
     QueryGuidingField,
     SampleDirectLight,
     TraceShadowRays,
+    TransmitShadowRays,  // the transparent surfaces on their way
     SampleScattering,
     RecordRadiance,
     AccumulateFilm,
@@ -58,29 +61,26 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Stage::Co
     "add_lamp_radiance",
     "add_escaped_radiance",
     "evaluate_materials",
+    "evaluate_textures",
     "add_emitted_radiance",
     "write_passes",
     "query_guiding_field",
     "sample_direct_light",
     "trace_shadow_rays",
+    "transmit_shadow_rays",
     "sample_scattering",
     "record_radiance",
     "accumulate_film",
     "train"};
 
-struct StageCounter {
-    std::uint64_t items = 0;
-    std::uint64_t nanoseconds = 0;
-};
-
 struct BatchStatistics {
-    std::array<StageCounter, static_cast<std::size_t>(Stage::Count)> stages{};
+    std::array<WorkCounter, static_cast<std::size_t>(Stage::Count)> stages{};
     std::uint64_t camera_samples = 0;
     std::uint64_t vertices = 0;
     std::uint64_t rays = 0;
     std::uint64_t nonfinite = 0;
 
-    [[nodiscard]] StageCounter& operator[](Stage stage) {
+    [[nodiscard]] WorkCounter& operator[](Stage stage) {
         return stages[static_cast<std::size_t>(stage)];
     }
 

@@ -11,6 +11,7 @@
 
 #include "core/math.h"
 #include "core/scene_report.h"
+#include "core/work_counter.h"
 #include "geometry/accelerator.h"
 #include "geometry/mesh.h"
 #include "geometry/surface_interaction.h"
@@ -101,6 +102,7 @@ struct ShadingScratch {
     std::vector<SurfaceInteraction> shifted;  // a little beside the hits: bump mapping
     std::vector<Bounds3> mesh_bounds;         // by mesh, where the context has none
     std::vector<const Vec3*> bounded_meshes;  // positions that mesh_bounds belong to
+    WorkCounter textures;                     // image look-ups since somebody asked
 };
 
 // Closures of a batch: path i has closures [first[i], first[i] + count[i]) and emitted radiance.

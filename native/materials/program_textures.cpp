@@ -99,7 +99,10 @@ void lookup(const Evaluation& e,
         return;
     }
     const bool straight = e.material.straight_alpha[use_index] != 0;
-    texture->lookup(u, v, {use.interpolation, use.extension, straight}, rgba);
+    count_work(e.scratch.textures, [&] {
+        texture->lookup(u, v, {use.interpolation, use.extension, straight}, rgba);
+        return u.size();
+    });
 }
 
 // The same of a tiled image, lane by lane.
@@ -110,17 +113,20 @@ void lookup_tiled(const Evaluation& e,
     const ImageUse& use = e.material.program.images[use_index];
     const bool straight = e.material.straight_alpha[use_index] != 0;
     const Texture missing;
-    for (std::size_t i = 0; i < e.lanes; ++i) {
-        float u = uv[i];
-        float v = uv[e.lanes + i];
-        const Texture* texture = find_texture(e, take_tile(use, u, v));
-        float texel[4];
-        (texture != nullptr ? *texture : missing)
-            .lookup({&u, 1}, {&v, 1}, {use.interpolation, use.extension, straight}, texel);
-        for (std::size_t k = 0; k < 4; ++k) {
-            rgba[k * e.lanes + i] = texel[k];
+    count_work(e.scratch.textures, [&] {
+        for (std::size_t i = 0; i < e.lanes; ++i) {
+            float u = uv[i];
+            float v = uv[e.lanes + i];
+            const Texture* texture = find_texture(e, take_tile(use, u, v));
+            float texel[4];
+            (texture != nullptr ? *texture : missing)
+                .lookup({&u, 1}, {&v, 1}, {use.interpolation, use.extension, straight}, texel);
+            for (std::size_t k = 0; k < 4; ++k) {
+                rgba[k * e.lanes + i] = texel[k];
+            }
         }
-    }
+        return e.lanes;
+    });
 }
 
 // Writes coordinates of every lane into the scratch; u first, then v.

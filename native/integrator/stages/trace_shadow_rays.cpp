@@ -124,7 +124,12 @@ void trace_transparent(const RenderContext& context, PathBatch& batch) {
         batch.visibility.assign(count, kVisibleShadow);
         context.scene.accelerator->intersect(
             batch.shadow_queries, batch.visibility, std::span(batch.hits).first(count));
-        pass_one_surface(context, batch);
+        const std::uint64_t textures = batch.scratch.textures.nanoseconds;
+        count_work(batch.transmission, [&] {
+            pass_one_surface(context, batch);
+            return batch.shadow_surfaces.size();
+        });
+        batch.transmission.nanoseconds -= batch.scratch.textures.nanoseconds - textures;
     }
 }
 

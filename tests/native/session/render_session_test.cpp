@@ -101,14 +101,47 @@ TEST(RenderSessionStatistics, NeeAndPlainPathTracingAgree) {
     EXPECT_NEAR(a.mean(1) / b.mean(1), 1.0, 0.03);
 }
 
+// What the room does not need: its light is a lamp, its materials are opaque and of one colour
+// each.
+constexpr const char* kNotInTheRoom[] = {"add_escaped_radiance",
+                                         "add_emitted_radiance",
+                                         "evaluate_textures",
+                                         "transmit_shadow_rays",
+                                         "query_guiding_field",
+                                         "train"};
+
 TEST(RenderSession, SkippedStagesCountNothing) {
     const Rendered result = render(room(32, 24, 2));
-    EXPECT_EQ(result.items("add_escaped_radiance"), 0u);
-    EXPECT_EQ(result.items("add_emitted_radiance"), 0u);
-    EXPECT_EQ(result.items("query_guiding_field"), 0u);
-    EXPECT_EQ(result.items("train"), 0u);
+    for (const char* const stage : kNotInTheRoom) {
+        EXPECT_EQ(result.items(stage), 0u) << stage;
+    }
     EXPECT_EQ(result.items("generate_camera_rays"), 32u * 24u * 2u);
     EXPECT_GT(result.items("add_lamp_radiance"), 0u);
+}
+
+// A floor with an image, lit through a pane: a look-up for each camera ray, since no other path
+// comes back to the floor, and shadow rays pass the pane.
+TEST(RenderSession, TexturesAndTransmissionAreStages) {
+    SceneBuilder b;
+    ImageDescription picture;
+    picture.width = picture.height = 2;
+    picture.pixels.assign(4 * 4, 0.5f);
+    const auto floor =
+        b.material("floor", image_diffuse_program({.image = b.image(std::move(picture))}));
+    const auto pane = b.material("pane", transparent_program(Rgb(0.5f)));
+    b.object(quad_mesh("floor", Vec3(-9, -9, 0), Vec3(18, 0, 0), Vec3(0, 18, 0)), floor);
+    b.object(quad_mesh("pane", Vec3(-9, -9, 2), Vec3(18, 0, 0), Vec3(0, 18, 0)), pane);
+    b.lamp(area_lamp(look_at(Vec3(0, 0, 3), Vec3(0)), Rgb(60.0f), 0.7f, 0.4f));
+    b.camera(Vec3(0, -1, 1), Vec3(0), 0.8f, 32, 24);
+    b.settings().samples = 8;
+    const Rendered result = render(b.build());
+    EXPECT_EQ(result.items("evaluate_textures"), 32u * 24u * 8u);
+    EXPECT_GT(result.items("transmit_shadow_rays"), 0u);
+    EXPECT_LE(result.items("transmit_shadow_rays"), result.items("trace_shadow_rays"));
+    for (const StageStatistics& stage : result.statistics.stages) {
+        EXPECT_GE(stage.seconds, 0.0) << stage.name;
+        EXPECT_LT(stage.seconds, 60.0) << stage.name;  // times inside each other: none below zero
+    }
 }
 
 // Share of all stages' time that went to those named, in percent; none of them may have items.
@@ -136,14 +169,12 @@ TEST(RenderSessionStatistics, SkippedStagesTakeNoTime) {
     SceneDescription without_world = room(64, 48, 64);
     SceneDescription without_nee = without_world;
     without_nee.settings.use_nee = false;
-    const char* const of_room[] = {
-        "add_escaped_radiance", "add_emitted_radiance", "query_guiding_field", "train"};
     const char* const of_plain_paths[] = {"sample_direct_light", "trace_shadow_rays"};
     const char* const of_sky[] = {"add_lamp_radiance", "add_emitted_radiance"};
     const auto percent = [](const SceneDescription& d, std::span<const char* const> skipped) {
         return least_of(0.5, [&] { return percent_of_time(render(d), skipped); });
     };
-    EXPECT_LT(percent(without_world, of_room), 0.5);
+    EXPECT_LT(percent(without_world, kNotInTheRoom), 0.5);
     EXPECT_LT(percent(without_nee, of_plain_paths), 0.5);
     EXPECT_LT(percent(without_lamps, of_sky), 0.5);
 }
