@@ -12,6 +12,10 @@ namespace pharos {
 namespace {
 
 constexpr double kRecordsPerPass = 32768.0;
+// Hard scenes starve on that: their records a vertex, and the most of a pass (lamp: 1.4 times less
+// error at equal time after 16 samples, 1.7 times after 64).
+constexpr double kHardRecords = 0.4;
+constexpr double kMaxRecordsPerPass = 262144.0;
 // Where paths are quiet, learning takes no more than a few percent of a pass: records a vertex.
 constexpr double kEasyRecords = 0.06;
 constexpr float kFirstRecordProbability = 0.1f;
@@ -174,7 +178,9 @@ void GuideController::learn(RecordBuffer records,
         status_.guided_share = hard_share_ > 0.0f ? 1.0 : selected.guided_share;
         status_.moment_ratio = selected.moment_ratio;
         status_.closed = selected.closed && !hard_;
-        if (!hard_ && pass_ > 0) {
+        if (hard_) {
+            wanted = std::clamp(kHardRecords * work.vertices, wanted, kMaxRecordsPerPass);
+        } else if (pass_ > 0) {
             wanted = std::min(wanted, kEasyRecords * work.vertices);
         }
         if (pass_ >= kProbingPasses) {
