@@ -123,6 +123,24 @@ def material_samples_emission(material) -> bool:
     return getattr(cycles, "sample_as_light", True)
 
 
+def terminator_shading_offset(obj) -> float:
+    """How far shading reaches beyond the terminator of coarse smooth meshes."""
+    if hasattr(obj, "shadow_terminator_shading_offset"):
+        return obj.shadow_terminator_shading_offset
+    return getattr(getattr(obj, "cycles", None), "shadow_terminator_offset", 0.0)
+
+
+def ignored_of_material(material) -> list[str]:
+    """What a material asks for besides its nodes and is not done."""
+    said = []
+    owner = material if hasattr(material, "use_transparent_shadow") else getattr(material, "cycles", None)
+    if not getattr(owner, "use_transparent_shadow", True):
+        said.append("Shadows are transparent where the surface is.")
+    if not getattr(material, "use_bump_map_correction", True):
+        said.append("Bump map correction is always on.")
+    return said
+
+
 def aov_name(node) -> str:
     """The pass that an AOV Output node writes."""
     return node.aov_name if hasattr(node, "aov_name") else node.name

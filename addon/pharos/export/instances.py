@@ -33,7 +33,9 @@ class InstanceExporter:
     def __init__(self, context):
         self._context = context
         self._native = context.native
-        self._visibility = Visibility(context.native, context.view_layer, context.report)
+        self._visibility = Visibility(
+            context.native, context.scene, context.view_layer, context.report
+        )
         self._meshes: dict[tuple, int | None] = {}
         self._sent: dict[int, int] = {}  # index in the description by version
         self._names: list[str] = []
@@ -57,10 +59,11 @@ class InstanceExporter:
         if obj.type == "LIGHT":
             self._add_light(instance)
         elif obj.type == "MESH":
-            self._add_surface(instance, place)
+            if self._context.view_layer.use_solid:
+                self._add_surface(instance, place)
         elif obj.type not in _SILENT_TYPES:
             what = _UNSUPPORTED_TYPES.get(obj.type, f"Objects of type {obj.type} are")
-            self._context.report.warn(obj.name, f"{what} not supported.")
+            self._context.report.warn(obj.name, f"{what} not supported.", "OBJECT")
         if instance.show_particles:
             self._name_hair(obj)
 
@@ -68,7 +71,8 @@ class InstanceExporter:
         for system in obj.particle_systems:
             settings = system.settings
             if settings.type == "HAIR" and settings.render_type == "PATH":
-                self._context.report.warn(obj.name, f"Hair {system.name!r} is not supported.")
+                message = f"Hair {system.name!r} is not supported."
+                self._context.report.warn(obj.name, message, "OBJECT")
 
     def _add_light(self, instance) -> None:
         obj = instance.object

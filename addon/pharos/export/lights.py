@@ -50,10 +50,10 @@ def light_fields(context, light, matrix) -> dict | None:
     native, report = context.native, context.report
     cycles = getattr(light, "cycles", None)
     if light.type == "AREA" and getattr(cycles, "is_portal", False):
-        report.info(light.name, "Light portals are not used.")
+        report.info(light.name, "Light portals are not used.", "LIGHT")
         return None
     if light.type == "SPOT" and light.use_square:
-        report.info(light.name, "Spot lights are round.")
+        report.info(light.name, "Spot lights are round.", "LIGHT")
     return {
         "type": getattr(native.LightType, _TYPES[light.type]),
         **_node_fields(context, light, matrix),

@@ -75,7 +75,7 @@ def _distribution(f, node) -> int:
         f.unsupported(node, f"distribution {node.distribution!r}")
         name = "Ggx"
     if name in {"Beckmann", "AshikhminShirley"} and _rough(f, node):
-        f.report.info(f.owner, f"Distribution {node.distribution!r} is shown as 'GGX'.")
+        f.inform(node, f"Distribution {node.distribution!r} is shown as 'GGX'.")
     return f.native.Distribution[name]
 
 
