@@ -133,7 +133,8 @@ def terminator_shading_offset(obj) -> float:
 def ignored_of_material(material) -> list[str]:
     """What a material asks for besides its nodes and is not done."""
     said = []
-    owner = material if hasattr(material, "use_transparent_shadow") else getattr(material, "cycles", None)
+    in_cycles = not hasattr(material, "use_transparent_shadow")
+    owner = getattr(material, "cycles", None) if in_cycles else material
     if not getattr(owner, "use_transparent_shadow", True):
         said.append("Shadows are transparent where the surface is.")
     if not getattr(material, "use_bump_map_correction", True):

@@ -76,14 +76,12 @@ class InstanceExporter:
 
     def _add_light(self, instance) -> None:
         obj = instance.object
-        fields = light_fields(self._context, obj.data, instance.matrix_world)
-        if fields is not None:
-            self._context.description.add_light(
-                name=obj.name,
-                to_world=[list(row) for row in instance.matrix_world],
-                visibility=self._visibility.of(instance),
-                **fields,
-            )
+        self._context.description.add_light(
+            name=obj.name,
+            to_world=[list(row) for row in instance.matrix_world],
+            visibility=self._visibility.of(instance),
+            **light_fields(self._context, obj.data, instance.matrix_world),
+        )
 
     def _add_surface(self, instance, place: int) -> None:
         obj = instance.object
