@@ -215,7 +215,7 @@ using namespace setup;
     c.type = type;
     c.weight = node_weight(in);
     c.n = glossy_normal(in.normal, ctx);
-    c.smith = smith_of(ctx);
+    c.smith = facets_of(in.distribution, ctx);
     set_roughness(c, node_roughness(in));
     return c;
 }
