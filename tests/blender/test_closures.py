@@ -65,7 +65,7 @@ def test_other_distributions():
     kind = "ShaderNodeBsdfGlossy" if _NEW else "ShaderNodeBsdfAnisotropic"
     for distribution in ("BECKMANN", "ASHIKHMIN_SHIRLEY"):
         fields = {"distribution": distribution}
-        # At 0.9 the silhouette of Ashikhmin's and Shirley's is 5 % brighter in Cycles, whose sampled
+        # At 0.9 the silhouette of the second kind is 5 % brighter in Cycles, whose sampled
         # directions are not of unit length there.
         for roughness in (0.35, 0.6, 0.9)[: 3 if distribution == "BECKMANN" else 2]:
             inputs = {"Color": _TINT, "Roughness": roughness}
