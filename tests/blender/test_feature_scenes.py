@@ -123,18 +123,20 @@ def _sky_shown(make):
     return background
 
 
-def _nishita(tree):
+def _nishita(tree, disc: bool):
     sky = tree.nodes.new("ShaderNodeTexSky")
     sky.sky_type = "NISHITA"
-    sky.sun_elevation, sky.sun_rotation, sky.sun_disc = 0.5, 2.2, False
+    sky.sun_elevation, sky.sun_rotation, sky.sun_disc = 0.5, 2.2, disc
     return sky
 
 
 def test_sky():
     """Light from one side: which one, is the sun's rotation."""
-    _yard()
-    _sky_shown(_nishita).inputs["Strength"].default_value = 0.05
-    _check("sky", 512)
+    for disc in (False, True):
+        _yard()
+        shown = _sky_shown(lambda tree, disc=disc: _nishita(tree, disc))
+        shown.inputs["Strength"].default_value = 0.05
+        _check(f"sky with{'' if disc else 'out'} the sun", 512)
 
 
 def _roof(half: float, hole: float, height: float) -> None:
