@@ -18,9 +18,10 @@ from . import (  # noqa: E402
     operators,
     panels,
     properties,
+    report_rows,
 )
 
-_PARTS = (properties, engine, operators, lobes, panels, compare, handlers, checkpoints)
+_PARTS = (properties, engine, operators, lobes, report_rows, panels, compare, handlers, checkpoints)
 
 
 def register():

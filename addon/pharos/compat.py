@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import bpy
 import numpy as np
 
@@ -9,6 +11,7 @@ VERSION = bpy.app.version
 _FLAT_PASSES = VERSION >= (4, 0, 0)
 _CORNER_NORMALS = VERSION >= (4, 1, 0)
 _FAST_ATTRIBUTES = VERSION >= (3, 6, 0)
+_WORTH_POINTERS = 1000  # fewer elements are as fast without
 SHORT_PASS_NAMES = VERSION < (5, 0, 0)
 
 
@@ -36,16 +39,42 @@ def mesh_positions(mesh) -> np.ndarray:
     return _read(mesh.vertices, "co", count, 3)
 
 
+def _in_memory(collection, name: str, integers: int, components: int) -> np.ndarray | None:
+    """The first `components` of so many 32-bit integers that each element is made of, read where
+    they lie: foreach_get asks for each one by itself. None where they do not lie as expected.
+    """
+    count, stride = len(collection), 4 * integers
+    if count < _WORTH_POINTERS:
+        return None
+    begin = collection[0].as_pointer()
+    probes = [*range(1, count, count // 7 + 1), count - 1]
+    if any(collection[i].as_pointer() != begin + stride * i for i in probes):
+        return None
+    memory = (ctypes.c_int32 * (integers * count)).from_address(begin)
+    values = np.frombuffer(memory, np.int32).reshape(count, integers)[:, :components]
+    for i in probes:
+        if np.any(values[i] != np.atleast_1d(getattr(collection[i], name))):
+            return None
+    return np.ascontiguousarray(values)  # Blender's memory is not kept
+
+
 def corner_vertices(mesh) -> np.ndarray:
     count = len(mesh.loops)
     if _FAST_ATTRIBUTES and ".corner_vert" in mesh.attributes:
         return _read(mesh.attributes[".corner_vert"].data, "value", count, 1, np.int32)
+    found = _in_memory(mesh.loops, "vertex_index", 2, 1)  # and the edge
+    if found is not None:
+        return found.ravel()
     return _read(mesh.loops, "vertex_index", count, 1, np.int32)
 
 
 def triangle_corners(mesh) -> np.ndarray:
     """Loop indices of each triangle."""
     mesh.calc_loop_triangles()
+    # In 3.x the polygon follows.
+    found = _in_memory(mesh.loop_triangles, "loops", 3 if _FLAT_PASSES else 4, 3)
+    if found is not None:
+        return found
     return _read(mesh.loop_triangles, "loops", len(mesh.loop_triangles), 3, np.int32)
 
 
@@ -121,6 +150,25 @@ def material_samples_emission(material) -> bool:
     if hasattr(cycles, "emission_sampling"):
         return cycles.emission_sampling != "NONE"
     return getattr(cycles, "sample_as_light", True)
+
+
+def terminator_shading_offset(obj) -> float:
+    """How far shading reaches beyond the terminator of coarse smooth meshes."""
+    if hasattr(obj, "shadow_terminator_shading_offset"):
+        return obj.shadow_terminator_shading_offset
+    return getattr(getattr(obj, "cycles", None), "shadow_terminator_offset", 0.0)
+
+
+def ignored_of_material(material) -> list[str]:
+    """What a material asks for besides its nodes and is not done."""
+    said = []
+    in_cycles = not hasattr(material, "use_transparent_shadow")
+    owner = getattr(material, "cycles", None) if in_cycles else material
+    if not getattr(owner, "use_transparent_shadow", True):
+        said.append("Shadows are transparent where the surface is.")
+    if not getattr(material, "use_bump_map_correction", True):
+        said.append("Bump map correction is always on.")
+    return said
 
 
 def aov_name(node) -> str:

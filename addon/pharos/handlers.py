@@ -13,6 +13,8 @@ import sys
 import bpy
 from bpy.app.handlers import persistent
 
+from .export.report import Entry
+
 _waiting: queue.SimpleQueue = queue.SimpleQueue()
 _epoch = [0]  # grows whenever pointers may stand for other things than before
 _DUMP_ARGUMENT = "--pharos-dump"
@@ -22,12 +24,14 @@ _RENDER_ARGUMENTS = {"-f", "--render-frame", "-a", "--render-anim"}
 def write_report(scene, entries) -> None:
     """Replace a scene's report where it has changed."""
     report = scene.pharos.report
-    if [(e.severity, e.object, e.message) for e in report] == [tuple(e) for e in entries]:
+    fields = Entry._fields
+    if [tuple(getattr(e, f) for f in fields) for e in report] == [tuple(e) for e in entries]:
         return
     report.clear()
     for entry in entries:
         item = report.add()
-        item.severity, item.object, item.message = entry
+        for field, value in zip(fields, entry):
+            setattr(item, field, value)
 
 
 def post_report(scene_name: str, entries) -> None:

@@ -202,19 +202,14 @@ class PHAROS_RENDER_PT_report(_RenderPanel, bpy.types.Panel):
 
     bl_label = "Report"
     bl_options = {"DEFAULT_CLOSED"}
-    _ICONS = {"INFO": "INFO", "WARNING": "ERROR", "ERROR": "CANCEL"}
-    _SHOWN = 50
 
     def draw(self, context):
         layout = self.layout
-        report = context.scene.pharos.report
-        if not report:
+        settings = context.scene.pharos
+        if settings.report:
+            layout.template_list("PHAROS_UL_report", "", settings, "report", settings, "report_row")
+        else:
             layout.label(text="Everything is rendered as given.", icon="CHECKMARK")
-        column = layout.column(align=True)
-        for entry in report[: self._SHOWN]:
-            column.label(text=f"{entry.object}: {entry.message}", icon=self._ICONS[entry.severity])
-        if len(report) > self._SHOWN:
-            column.label(text=f"{len(report) - self._SHOWN} more")
         layout.operator("pharos.dump", icon="EXPORT")
 
 

@@ -124,7 +124,7 @@ def name_unsupported_passes(view_layer, report) -> None:
     names += [n for switch, n in _UNSUPPORTED_CYCLES.items() if getattr(cycles, switch, False)]
     names += [f"Light Group {group.name}" for group in getattr(view_layer, "lightgroups", ())]
     for name in names:
-        report.warn(view_layer.name, f"Pass {name!r} is not supported.")
+        report.warn(view_layer.name, f"Pass {name!r} is not supported.", "VIEW_LAYER")
 
 
 class PassRequest:

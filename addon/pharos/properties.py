@@ -32,6 +32,9 @@ class PharosReportEntry(bpy.types.PropertyGroup):
     )
     object: StringProperty(name="Name", description="What it is about")
     message: StringProperty(name="Message")
+    kind: StringProperty(name="Kind", description="What the name is one of")
+    tree: StringProperty(name="Group", description="The group that the node is in")
+    node: StringProperty(name="Node")
 
 
 def _bounces(name: str, description: str, default: int = 12):
@@ -198,6 +201,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         description="What the last render could not take as given (read only)",
         type=PharosReportEntry,
     )
+    report_row: IntProperty(name="Report Row", options={"HIDDEN", "SKIP_SAVE"})
 
 
 class PharosViewLayerSettings(bpy.types.PropertyGroup):

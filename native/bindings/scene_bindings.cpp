@@ -242,7 +242,8 @@ void bind_parts(py::module_& m) {
         .def_readwrite("use_mis", &LightDescription::use_mis)
         .def_readwrite("visibility", &LightDescription::visibility)
         .def_readwrite("max_bounces", &LightDescription::max_bounces)
-        .def_readwrite("program", &LightDescription::program);
+        .def_readwrite("program", &LightDescription::program)
+        .def_readwrite("is_portal", &LightDescription::is_portal);
     py::class_<WorldDescription>(m, "WorldDescription", py::module_local())
         .def_readwrite("program", &WorldDescription::program)
         .def_readwrite("map_resolution", &WorldDescription::map_resolution)

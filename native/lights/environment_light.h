@@ -29,6 +29,8 @@ class EnvironmentLight {
     [[nodiscard]] Sample sample(const Vec2& u) const;
     [[nodiscard]] float pdf(const Vec3& wi) const;
 
+    [[nodiscard]] bool is_constant() const { return constant_; }
+
     [[nodiscard]] Rgb mean_radiance() const { return mean_; }  // over the sphere, for light choice
 
   private:

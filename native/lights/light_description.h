@@ -34,6 +34,7 @@ struct LightDescription {
     std::uint32_t visibility = kVisibleAll;
     std::uint32_t max_bounces = 1024;
     std::uint32_t program = kNone;  // into SceneDescription::light_programs
+    bool is_portal = false;  // area: emits nothing, the world's light is looked for through it
 
     bool operator==(const LightDescription&) const = default;
 };

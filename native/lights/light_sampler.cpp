@@ -6,6 +6,7 @@
 #include "lights/lamp_tree.h"
 #include "lights/light_bound.h"
 #include "lights/light_selection.h"
+#include "lights/portals.h"
 
 namespace pharos {
 
@@ -32,6 +33,7 @@ struct LightSampler::Impl {
     std::vector<Lamp> lamps;
     EmissiveTriangles triangles;
     const EnvironmentLight* environment = nullptr;
+    Portals portals;
     LightSelection selection;
     LampTree tree;
     std::vector<std::uint32_t> suns;  // lamps that an escaped ray can see
@@ -92,6 +94,10 @@ LightHit LightSampler::Impl::finish_hit(const LampHit& hit,
 LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_unique<Impl>()) {
     std::vector<LightBound> bounds;
     for (std::uint32_t i = 0; i < input.lamps.size(); ++i) {
+        if (input.lamps[i].is_portal) {
+            impl_->portals.add(input.lamps[i]);
+            continue;
+        }
         if (const auto lamp = make_lamp(input.lamps[i], input.blender_version, i)) {
             if (lamp->hittable && is_distant(*lamp)) {
                 impl_->suns.push_back(impl_->lamp_count());
@@ -143,7 +149,12 @@ std::optional<LightSamplerSample> LightSampler::sample(const LightSampleContext&
     }
     LightSamplerSample result;
     if (choice->group == impl.environment_group()) {
-        const EnvironmentLight::Sample sample = impl.environment->sample(u);
+        const EnvironmentLight::Sample sample =
+            impl.portals.empty() ? impl.environment->sample(u)
+                                 : impl.portals.sample(*impl.environment, context, u);
+        if (!(sample.pdf > 0.0f)) {
+            return std::nullopt;
+        }
         result.sample.wi = sample.wi;
         result.sample.pdf = sample.pdf * choice->pmf;
         result.sample.distance = kInfinity;
@@ -204,7 +215,10 @@ float LightSampler::pdf_environment(const LightSampleContext& context, const Vec
     if (impl_->environment == nullptr) {
         return 0.0f;
     }
-    return impl_->environment->pdf(wi) * impl_->selection.pmf(context, impl_->environment_group());
+    const float direction = impl_->portals.empty()
+                                ? impl_->environment->pdf(wi)
+                                : impl_->portals.pdf(*impl_->environment, context, wi);
+    return direction * impl_->selection.pmf(context, impl_->environment_group());
 }
 
 float LightSampler::pdf_triangle(const LightSampleContext& context,

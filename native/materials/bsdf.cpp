@@ -12,6 +12,7 @@
 #include "materials/lobes/clearcoat.h"
 #include "materials/lobes/diffuse.h"
 #include "materials/lobes/ggx.h"
+#include "materials/lobes/other_distributions.h"
 #include "materials/lobes/sheen.h"
 #include "materials/lobes/toon.h"
 #include "materials/lobes/velvet.h"
@@ -35,10 +36,15 @@ namespace {
         case ClosureType::Transparent:
             return {};
         case ClosureType::GgxReflection:
+            if (c.smith > kSeparableMasking) {
+                return c.smith >= kAshikhminShirleyFacets ? eval_ashikhmin_shirley(c, wo, wi)
+                                                          : eval_beckmann(c, wo, wi);
+            }
             return eval_ggx_reflection(c, wo, wi);
         case ClosureType::GgxRefraction:
         case ClosureType::GgxGlass:
-            return eval_ggx_glass(c, wo, wi);
+            return c.smith > kSeparableMasking ? eval_beckmann(c, wo, wi)
+                                               : eval_ggx_glass(c, wo, wi);
         case ClosureType::Clearcoat:
             return eval_clearcoat(c, wo, wi);
         case ClosureType::Sheen:
@@ -59,7 +65,8 @@ namespace {
                                                           const Vec2& u) {
     switch (c.type) {
         case ClosureType::GgxReflection:
-            return sample_ggx_reflection(c, wo, u);
+            return c.smith >= kAshikhminShirleyFacets ? sample_ashikhmin_shirley(c, wo, u)
+                                                      : sample_ggx_reflection(c, wo, u);
         case ClosureType::GgxRefraction:
         case ClosureType::GgxGlass:
             return sample_ggx_glass(c, wo, u_branch, u);

@@ -43,6 +43,11 @@ enum class FresnelType : std::uint8_t {
     ThinFilm,            // f0; f90 = (index of the film, its thickness in nm, -)
 };
 
+// Closure::smith of microfacets. Of 4.x and GGX: none of these.
+inline constexpr std::uint8_t kSeparableMasking = 1;  // 3.x; else height-correlated
+inline constexpr std::uint8_t kBeckmannFacets = 2;
+inline constexpr std::uint8_t kAshikhminShirleyFacets = 4;  // reflection only
+
 // One lobe. Plain data; a batch holds them contiguously by path.
 struct Closure {
     Rgb weight{0.0f};
@@ -59,7 +64,7 @@ struct Closure {
     float parameter = 0.0f;  // Oren-Nayar sigma, Disney roughness, sheen roughness
     ClosureType type = ClosureType::Diffuse;
     FresnelType fresnel = FresnelType::None;
-    std::uint8_t smith = 0;  // 0: height-correlated (Blender 4.x), 1: separable (3.x)
+    std::uint8_t smith = 0;
 };
 
 inline constexpr int kMaxClosures = 12;  // per hit; the least important are dropped and counted

@@ -35,7 +35,15 @@ inline constexpr float kWeightCutoff = 1e-5f;
 
 // 4.x masks by height correlation, 3.x separably.
 [[nodiscard]] inline std::uint8_t smith_of(const ClosureSetupContext& ctx) {
-    return ctx.blender_version >= 400 ? 0 : 1;
+    return ctx.blender_version >= 400 ? 0 : kSeparableMasking;
+}
+
+// The same with the facets of a distribution.
+[[nodiscard]] inline std::uint8_t facets_of(Distribution d, const ClosureSetupContext& ctx) {
+    const int facets = d == Distribution::Beckmann           ? kBeckmannFacets
+                       : d == Distribution::AshikhminShirley ? kAshikhminShirleyFacets
+                                                             : 0;
+    return static_cast<std::uint8_t>(smith_of(ctx) | facets);
 }
 
 // Unit normal of a closure. Mirror-like closures always get the reflection fix, diffuse ones before

@@ -127,13 +127,22 @@ void compensate(Closure& c, const Rgb& fss, float e, float average_e) {
     c.smith = 0;
 }
 
+// Cycles 3 walks from facet to facet at random. Its albedo under a white sky is, within 1e-3, that
+// of a walk which goes on with this probability after each bounce but the first, for rough lobes of
+// three colours under six angles: a fit to 3.4.1's pictures.
+[[nodiscard]] float walk_goes_on(float rough, float mu) {
+    return 0.395f * std::pow(rough, 1.9f) * std::sqrt(mu);
+}
+
 }  // namespace
 
 void preserve_reflection_energy(Closure& c, const Rgb& fss, const ClosureSetupContext& ctx) {
     if (!is_delta(c)) {
         const float rough = std::sqrt(std::sqrt(c.alpha_x * c.alpha_y));
-        const float e = ggx_albedo(glm::dot(c.n, ctx.wo), rough);
-        compensate(c, fss, e, ggx_average_albedo(rough));
+        const float mu = glm::dot(c.n, ctx.wo);
+        const float leaving = ctx.blender_version < 400 ? 1.0f - walk_goes_on(rough, saturate(mu))
+                                                        : ggx_average_albedo(rough);
+        compensate(c, fss, ggx_albedo(mu, rough), leaving);
     }
 }
 
@@ -215,7 +224,7 @@ using namespace setup;
     c.type = type;
     c.weight = node_weight(in);
     c.n = glossy_normal(in.normal, ctx);
-    c.smith = smith_of(ctx);
+    c.smith = facets_of(in.distribution, ctx);
     set_roughness(c, node_roughness(in));
     return c;
 }

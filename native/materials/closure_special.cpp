@@ -41,7 +41,7 @@ using namespace setup;
 // Here the two roughnesses are r (1 - a) and r / (1 - a), and a may be negative.
 void setup_anisotropic(const ScatterInputs& in, const ClosureSetupContext& ctx, ClosureSink& sink) {
     Closure c = closure_of(ClosureType::GgxReflection, in, glossy_normal(in.normal, ctx));
-    c.smith = smith_of(ctx);
+    c.smith = facets_of(in.distribution, ctx);
     set_roughness(c, in.distribution == Distribution::Sharp ? 0.0f : in.roughness);
     const Vec3 tangent = tangent_around(c.n, tangent_of(in, ctx));
     const float amount = bounded(in.anisotropy, -0.99f, 0.99f);
@@ -63,7 +63,7 @@ void setup_metallic(const ScatterInputs& in, const ClosureSetupContext& ctx, Clo
     Closure c = closure_of(ClosureType::GgxReflection, in, glossy_normal(in.normal, ctx));
     c.weight = safe_color(in.weight);
     c.fresnel = FresnelType::F82Tint;
-    c.smith = smith_of(ctx);
+    c.smith = facets_of(in.distribution, ctx);
     Rgb tint = clamp_color(in.edge);
     c.f0 = clamp_color(in.color);
     if (in.physical) {

@@ -31,8 +31,8 @@ inline constexpr bool kPlain =
     std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> || std::is_same_v<T, UVec3> ||
     std::is_same_v<T, Mat4>;
 
-inline constexpr std::uint32_t kVersion =
-    4;  // 2: passes on request; 3: attributes; 4: AOVs, tiles, lamps' nodes, displacement
+// 2: passes on request; 3: attributes; 4: AOVs, tiles, lamps' nodes, displacement; 5: portals
+inline constexpr std::uint32_t kVersion = 5;
 inline constexpr std::uint32_t kOldestVersion = 1;
 
 class Writer {

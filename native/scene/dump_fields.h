@@ -171,11 +171,15 @@ void fields(Archive& archive, DumpValue<Archive, LightDescription>& value) {
            use_mis,
            visibility,
            max_bounces,
-           program] = value;
+           program,
+           is_portal] = value;
     archive(name, type, to_world, strength, radius, spot_angle, spot_blend, shape, size_u, size_v);
     archive(spread, angle, soft_falloff, normalize, cast_shadow, use_mis, visibility, max_bounces);
     if (archive.version() >= 4) {
         archive(program);
+    }
+    if (archive.version() >= 5) {
+        archive(is_portal);
     }
 }
 

@@ -86,6 +86,19 @@ def test_mix():
     check(cases)
 
 
+def test_normal():
+    def build(output):
+        def make(owner):
+            node = harness.node(owner, "ShaderNodeNormal")
+            node.outputs[0].default_value = (0.6, -0.48, 0.64)
+            _feed(owner, node)
+            return node.outputs[output]
+
+        return make
+
+    check([Case(f"normal {output}", build(output)) for output in (0, 1)])
+
+
 def test_map_range_and_clamp():
     cases = []
     for interpolation in _modes("ShaderNodeMapRange", "interpolation_type"):
@@ -143,8 +156,9 @@ def _scaled(kind: str, factor: float, offset: float):
 
 
 def test_blackbody():
-    """Ours is computed, Cycles' a fit that leaves the curve where hardly anything glows white."""
-    check([_scaled("ShaderNodeBlackbody", 1000.0, 7000.0)], 2e-2)
+    """From below zero to far beyond the hottest that is told apart."""
+    ranges = ((1000.0, 1500.0), (1000.0, 7000.0), (5000.0, 10000.0))
+    check([_scaled("ShaderNodeBlackbody", *values) for values in ranges])
 
 
 def _ramp(interpolation: str, mode: str = "RGB"):

@@ -60,6 +60,29 @@ def test_anisotropic():
             look(f"glossy {title} {amount}", kind, fields, 0.05, link, **inputs)
 
 
+def test_other_distributions():
+    """Beckmann's facets and Ashikhmin's and Shirley's, round and long, mirrored and refracted."""
+    kind = "ShaderNodeBsdfGlossy" if _NEW else "ShaderNodeBsdfAnisotropic"
+    for distribution in ("BECKMANN", "ASHIKHMIN_SHIRLEY"):
+        fields = {"distribution": distribution}
+        # At 0.9 the silhouette of the second kind is 5 % brighter in Cycles, whose sampled
+        # directions are not of unit length there.
+        for roughness in (0.35, 0.6, 0.9)[: 3 if distribution == "BECKMANN" else 2]:
+            inputs = {"Color": _TINT, "Roughness": roughness}
+            name = f"{distribution} {roughness}"
+            look(name, "ShaderNodeBsdfGlossy", fields, 0.05, **inputs)
+        inputs = {"Color": _TINT, "Roughness": 0.5, "Anisotropy": 0.6, "Rotation": 0.1}
+        # Long Beckmann lobes of 3.4 are masked by a formula that is not known: 4 % off.
+        bound = 0.05 if _NEW or distribution != "BECKMANN" else 0.15
+        look(f"long {distribution}", kind, fields, bound, _tangent("RADIAL"), **inputs)
+    for node in ("Glass", "Refraction"):
+        for roughness in (0.3, 0.7):
+            inputs = {"Color": _TINT, "Roughness": roughness, "IOR": 1.4}
+            fields = {"distribution": "BECKMANN"}
+            # The sun through rough glass is noisy.
+            look(f"{node} BECKMANN {roughness}", f"ShaderNodeBsdf{node}", fields, 0.1, **inputs)
+
+
 def test_metallic():
     if harness.VERSION < (4, 3, 0):
         raise harness.Skip("no Metallic BSDF in this version")

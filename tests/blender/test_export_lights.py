@@ -92,11 +92,13 @@ def test_visibility_and_flags():
     assert not out.use_mis and out.max_bounces == 3
 
 
-def test_portals_emit_nothing():
+def test_portals_have_a_shape_and_no_strength():
     light, _ = _lamp("AREA")
-    light.cycles.is_portal = True
-    assert len(harness.exported().lights) == 0
-    assert any("portal" in line for line in harness.report())
+    light.cycles.is_portal, light.size = True, 3.0
+    (out,) = harness.exported().lights
+    assert out.is_portal and out.size_u == 3.0
+    assert tuple(out.strength) == (0.0, 0.0, 0.0)
+    assert harness.report() == [], harness.report()
 
 
 def test_world_colour():

@@ -17,11 +17,11 @@ _SURE = 1.96
 _TINT = (0.8, 0.5, 0.3, 1.0)
 
 
-def _shaded(kind: str = "ShaderNodeBsdfDiffuse", **inputs):
+def _shaded(kind: str = "ShaderNodeBsdfDiffuse", distribution: str = "GGX", **inputs):
     owner = harness.material()
     shader = harness.node(owner, kind, **inputs)
     if hasattr(shader, "distribution"):
-        shader.distribution = "GGX"
+        shader.distribution = distribution
     harness.connect(owner, shader.outputs[0], harness.surface(owner))
     return owner, shader
 
@@ -109,15 +109,66 @@ def test_worlds():
     _yard()
     _check("one colour")
     _yard()
+    _sky_shown(_surroundings)
+    _check("picture of surroundings", 512)
+
+
+def _sky_shown(make):
+    """A world of the node that `make` makes of the world's tree; returns the background."""
     world = bpy.context.scene.world
     world.use_nodes = True
     tree = world.node_tree
     background = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground")
+    tree.links.new(make(tree).outputs[0], background.inputs[0])
+    return background
+
+
+def _nishita(tree, disc: bool):
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sky_type = "NISHITA"
+    sky.sun_elevation, sky.sun_rotation, sky.sun_disc = 0.5, 2.2, disc
+    return sky
+
+
+def test_sky():
+    """Light from one side: which one, is the sun's rotation."""
+    for disc in (False, True):
+        _yard()
+        shown = _sky_shown(lambda tree, disc=disc: _nishita(tree, disc))
+        shown.inputs["Strength"].default_value = 0.05
+        _check(f"sky with{'' if disc else 'out'} the sun", 512)
+
+
+def _roof(half: float, hole: float, height: float) -> None:
+    """A square sheet over the yard with a square hole."""
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    corners = [(x * size, y * size, 0.0) for size in (half, hole) for x, y in signs]
+    faces = [(i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i) for i in range(4)]
+    mesh = harness.make_mesh("Roof", corners, faces)
+    grey = _shaded(Color=(0.5, 0.5, 0.5, 1.0))[0]
+    harness.add_object(mesh, grey, location=(0.0, 0.0, height))
+
+
+def _surroundings(tree):
     picture = tree.nodes.new("ShaderNodeTexEnvironment")
     picture.image = bpy.data.images.new("surroundings", 16, 8)
     picture.image.generated_type = "COLOR_GRID"
-    tree.links.new(picture.outputs[0], background.inputs[0])
-    _check("picture of surroundings", 512)
+    return picture
+
+
+def test_portals():
+    """A hole in a roof, with portals that face the yard, that lie and that look away."""
+    for name in ("one colour", "picture"):
+        _yard()
+        _roof(3.0, 0.8, 3.2)
+        for y, turn in ((0.0, 0.0), (-3.5, 1.3), (2.0, 3.14159)):
+            opening = _lamp("AREA", size=1.6, energy=0.0 if turn else 50.0)
+            opening.data.cycles.is_portal = True
+            opening.location, opening.rotation_euler = (0.0, y, 3.2), (turn, 0.0, 0.0)
+        if name == "picture":
+            _sky_shown(_surroundings)
+        _check(f"portals {name}", 512)
+        assert harness.report() == [], harness.report()
 
 
 def test_lobes():
@@ -125,6 +176,7 @@ def test_lobes():
         ("ShaderNodeBsdfGlossy", {"Roughness": 0.3}),
         ("ShaderNodeBsdfGlass", {"Roughness": 0.4, "IOR": 1.4}),
         ("ShaderNodeBsdfTranslucent", {}),
+        ("ShaderNodeBsdfRefraction", {"Roughness": 0.5, "IOR": 1.3, "distribution": "BECKMANN"}),
         ("ShaderNodeBsdfPrincipled", {"Metallic": 0.4, "Roughness": 0.35}),
     ):
         name = "Base_Color" if kind.endswith("Principled") else "Color"

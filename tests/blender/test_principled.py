@@ -61,9 +61,9 @@ def _sweep(table, distribution: str) -> None:
                 inputs["Emission_Color" if _NEW else "Emission"] = _OTHER
             tolerance = 0.06 if name in _ROUGHLY else 0.03
             if distribution == "MULTI_GGX" and not _NEW:
-                # Cycles 3.x walks between facets at random; ours gives back what is lost, as 4.x
-                # does, and a rough metal is up to 5 % off.
-                tolerance = 0.15
+                # Cycles 3.x walks between facets at random. Ours gives back what that walk does,
+                # but within the lobe, where the walk spreads it: the roughest metal is 3.4 % off.
+                tolerance = 0.11
             fields = {"distribution": distribution}
             look(f"{name} {value}", _KIND, fields, tolerance, **inputs)
 

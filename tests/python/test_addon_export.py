@@ -255,10 +255,10 @@ def test_report_says_everything_once():
     report = part("export.report").Report()
     for _ in range(2):
         report.warn("Cube", "odd")
-    report.info("Cube", "odd")
+    report.info("Cube", "odd", "OBJECT")
     assert [tuple(entry) for entry in report.entries] == [
-        ("WARNING", "Cube", "odd"),
-        ("INFO", "Cube", "odd"),
+        ("WARNING", "Cube", "odd", "", "", ""),
+        ("INFO", "Cube", "odd", "OBJECT", "", ""),
     ]
 
 

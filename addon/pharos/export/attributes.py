@@ -59,7 +59,7 @@ def read_attributes(mesh, names, report) -> list:
         elif domain == "FACE":
             rows = rows[compat.triangle_polygons(mesh)]
         elif domain != "POINT":
-            report.warn(mesh.name, f"Attribute {name!r} of edges is not supported.")
+            report.warn(mesh.name, f"Attribute {name!r} of edges is not supported.", "MESH")
             continue
         found.append((name, domain, np.ascontiguousarray(rows, np.float32)))
     return found

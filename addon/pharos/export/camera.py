@@ -102,7 +102,8 @@ def camera_fields(native, camera_object, frame: Frame, report, override=None) ->
     """Arguments of set_camera; `override`: (matrix, shift_x) of a stereo view."""
     camera = camera_object.data
     if camera.type not in {"PERSP", "ORTHO"}:
-        report.warn(camera_object.name, "Panoramic cameras are rendered as perspective ones.")
+        message = "Panoramic cameras are rendered as perspective ones."
+        report.warn(camera_object.name, message, "OBJECT")
     matrix, shift_x = override or (camera_object.matrix_world, camera.shift_x)
     matrix = rigid(matrix)
     horizontal = fits_horizontally(camera.sensor_fit, frame)

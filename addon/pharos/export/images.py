@@ -133,12 +133,13 @@ class ImageTable:
         alpha = _ALPHA[image.alpha_mode]
         if not exact:
             name = image.colorspace_settings.name
-            self._report.warn(image.name, f"Colour space {name!r} is read as {space}.")
+            self._report.warn(image.name, f"Colour space {name!r} is read as {space}.", "IMAGE")
         if image.source == "MOVIE":
-            self._report.warn(image.name, "One picture of this movie is used.")
+            self._report.warn(image.name, "One picture of this movie is used.", "IMAGE")
         in_blender = self._lives_in_blender(image)
         if in_blender and image.source == "TILED":
-            self._report.warn(image.name, "Of tiles that are not saved, the first is used.")
+            message = "Of tiles that are not saved, the first is used."
+            self._report.warn(image.name, message, "IMAGE")
         if in_blender and image.is_float:
             # Blender holds such pixels scene-linear and multiplied by alpha.
             space = space if space == "Data" else "Linear"

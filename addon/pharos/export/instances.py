@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .attributes import instance_value, read_attributes
@@ -27,13 +29,28 @@ class Cancelled(Exception):
     """The user stopped the export."""
 
 
+class _Surface(NamedTuple):
+    """A mesh as one object shows it."""
+
+    row: tuple[int, int, int]  # mesh, material set, visibility
+    name: str
+    pass_index: int
+    attributes: frozenset
+
+
+_LAMP = object()
+
+
 class InstanceExporter:
     """Walks depsgraph.object_instances once; nothing of an instance outlives its step there."""
 
     def __init__(self, context):
         self._context = context
         self._native = context.native
-        self._visibility = Visibility(context.native, context.view_layer, context.report)
+        self._visibility = Visibility(
+            context.native, context.scene, context.view_layer, context.report
+        )
+        self._surfaces: dict[tuple, object] = {}  # by object, data, instancer, hair
         self._meshes: dict[tuple, int | None] = {}
         self._sent: dict[int, int] = {}  # index in the description by version
         self._names: list[str] = []
@@ -53,51 +70,74 @@ class InstanceExporter:
         self._add_rows(matrices)
 
     def _visit(self, instance, place: int) -> None:
+        """All but the first instance of an object cost no more than finding that out."""
         obj = instance.object
-        if obj.type == "LIGHT":
+        parent = instance.parent if instance.is_instance else None
+        # What stands in for an object while it is instanced is always at the same place in memory.
+        data = obj.data
+        key = (
+            obj.original.as_pointer(),
+            data.as_pointer() if data is not None else 0,
+            parent.as_pointer() if parent is not None else 0,
+            instance.show_particles,
+        )
+        if key not in self._surfaces:
+            self._surfaces[key] = self._first_of(instance, obj)
+        kind = self._surfaces[key]
+        if kind is _LAMP:
             self._add_light(instance)
-        elif obj.type == "MESH":
-            self._add_surface(instance, place)
-        elif obj.type not in _SILENT_TYPES:
-            what = _UNSUPPORTED_TYPES.get(obj.type, f"Objects of type {obj.type} are")
-            self._context.report.warn(obj.name, f"{what} not supported.")
+        elif kind is not None:
+            self._add_surface(instance, kind, place)
+
+    def _first_of(self, instance, obj):
+        """What all instances of an object share: _LAMP, a surface, None; names what is missing."""
         if instance.show_particles:
             self._name_hair(obj)
+        if obj.type == "LIGHT":
+            return _LAMP
+        if obj.type == "MESH":
+            return self._surface(instance, obj) if self._context.view_layer.use_solid else None
+        if obj.type not in _SILENT_TYPES:
+            what = _UNSUPPORTED_TYPES.get(obj.type, f"Objects of type {obj.type} are")
+            self._context.report.warn(obj.name, f"{what} not supported.", "OBJECT")
+        return None
 
     def _name_hair(self, obj) -> None:
         for system in obj.particle_systems:
             settings = system.settings
             if settings.type == "HAIR" and settings.render_type == "PATH":
-                self._context.report.warn(obj.name, f"Hair {system.name!r} is not supported.")
+                message = f"Hair {system.name!r} is not supported."
+                self._context.report.warn(obj.name, message, "OBJECT")
 
     def _add_light(self, instance) -> None:
         obj = instance.object
-        fields = light_fields(self._context, obj.data, instance.matrix_world)
-        if fields is not None:
-            self._context.description.add_light(
-                name=obj.name,
-                to_world=[list(row) for row in instance.matrix_world],
-                visibility=self._visibility.of(instance),
-                **fields,
-            )
+        self._context.description.add_light(
+            name=obj.name,
+            to_world=[list(row) for row in instance.matrix_world],
+            visibility=self._visibility.of(instance),
+            **light_fields(self._context, obj.data, instance.matrix_world),
+        )
 
-    def _add_surface(self, instance, place: int) -> None:
-        obj = instance.object
+    def _surface(self, instance, obj) -> _Surface | None:
         bits = self._visibility.of(instance)
         if not bits:
-            return
+            return None
         self._visibility.name_unsupported(obj)
         materials = self._context.materials.set_of(obj)
-        passes = self._context.passes
-        with_uv = materials.uses_uv or passes.needs_uv
+        with_uv = materials.uses_uv or self._context.passes.needs_uv
         mesh = self._mesh_index(obj, with_uv, materials.mesh_attributes)
-        if mesh is not None:
-            self._names.append(obj.name)
-            passes.object_indices.append(obj.pass_index)
-            for name in materials.instance_attributes:
-                values = self._attributes.setdefault(name, {})
-                values[len(self._rows)] = instance_value(self._native, instance, name)
-            self._rows.append((place, mesh, materials.index, bits))
+        if mesh is None:
+            return None
+        row = (mesh, materials.index, bits)
+        return _Surface(row, obj.name, obj.pass_index, materials.instance_attributes)
+
+    def _add_surface(self, instance, surface: _Surface, place: int) -> None:
+        self._names.append(surface.name)
+        self._context.passes.object_indices.append(surface.pass_index)
+        for name in surface.attributes:
+            values = self._attributes.setdefault(name, {})
+            values[len(self._rows)] = instance_value(self._native, instance, name)
+        self._rows.append((place, *surface.row))
 
     def _mesh_index(self, obj, uses_uv: bool, attributes: frozenset) -> int | None:
         slots = len(obj.material_slots)

@@ -45,15 +45,14 @@ def _shape_fields(native, light) -> dict:
     return fields
 
 
-def light_fields(context, light, matrix) -> dict | None:
-    """Arguments of add_light but for name, place and visibility; None: emits nothing itself."""
+def light_fields(context, light, matrix) -> dict:
+    """Arguments of add_light but for name, place and visibility."""
     native, report = context.native, context.report
     cycles = getattr(light, "cycles", None)
     if light.type == "AREA" and getattr(cycles, "is_portal", False):
-        report.info(light.name, "Light portals are not used.")
-        return None
+        return {"type": native.LightType.Area, "is_portal": True, **_shape_fields(native, light)}
     if light.type == "SPOT" and light.use_square:
-        report.info(light.name, "Spot lights are round.")
+        report.info(light.name, "Spot lights are round.", "LIGHT")
     return {
         "type": getattr(native.LightType, _TYPES[light.type]),
         **_node_fields(context, light, matrix),

@@ -53,6 +53,8 @@ class MaterialTable:
             flat = flatten_material(
                 self._native, self._images, self._report, material, self._aovs
             )
+            for message in compat.ignored_of_material(material):
+                self._report.info(material.name, message, "MATERIAL")
             moves = flatten_displacement(self._native, self._images, self._report, material)
             index = self._description.add_material(
                 name=material.name,

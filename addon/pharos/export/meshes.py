@@ -84,7 +84,12 @@ def _uv_maps(mesh, corners: np.ndarray) -> list:
     layers = sorted(mesh.uv_layers, key=lambda layer: not layer.active_render)
     count = len(mesh.loops)
     flat = corners.ravel()
-    return [(layer.name, compat.uv_coordinates(layer, count)[flat]) for layer in layers]
+    found = []
+    for layer in layers:
+        # Both coordinates at once, as one number of 64 bits.
+        pairs = compat.uv_coordinates(layer, count).view(np.int64).ravel()
+        found.append((layer.name, pairs.take(flat).view(np.float32).reshape(-1, 2)))
+    return found
 
 
 def read_mesh(mesh, slot_count: int, with_uv: bool) -> MeshArrays | None:

@@ -74,14 +74,7 @@ def _distribution(f, node) -> int:
     if name is None:
         f.unsupported(node, f"distribution {node.distribution!r}")
         name = "Ggx"
-    if name in {"Beckmann", "AshikhminShirley"} and _rough(f, node):
-        f.report.info(f.owner, f"Distribution {node.distribution!r} is shown as 'GGX'.")
     return f.native.Distribution[name]
-
-
-def _rough(f, node) -> bool:
-    socket = next((s for s in node.inputs if s.identifier == "Roughness"), None)
-    return socket is not None and (socket.is_linked or socket.default_value > 0.0)
 
 
 def _name_missing_features(f, node, scope) -> None:

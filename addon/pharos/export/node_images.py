@@ -60,7 +60,7 @@ def _sky(f, node, scope, socket):
     if kind == "HOSEK_WILKIE":
         f.unsupported(node, "the sky of Hosek and Wilkie (that of Preetham is shown)")
     elif kind not in _SKIES and f.version >= 500:
-        f.report.info(f.owner, "The scattered sky is that of Blender 4.")
+        f.inform(node, "The scattered sky is that of Blender 4.")
     vector = vector_or(f, node, scope, lambda: direction(f))
     single = kind not in _SKIES
     # Dust became aerosols in Blender 5.

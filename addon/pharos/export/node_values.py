@@ -240,6 +240,18 @@ def _fresnel(f, node, scope, socket):
     return f.program.op("Fresnel", operands, 1)
 
 
+def _normal_direction(f, node, scope, socket):
+    """The node's own direction, or the cosine of its angle to the normal that is given."""
+    # Cycles takes the direction as it is, not at unit length.
+    direction = f.program.constant(*node.outputs["Normal"].default_value)
+    if socket.identifier == "Normal":
+        return direction
+    zero = f.program.constant(0.0, 0.0, 0.0)
+    given = f.input(node, scope, "Normal", 3)
+    given = f.program.vector_math("Normalize", given, zero)
+    return f.program.slice(f.program.vector_math("DotProduct", direction, given), 1)
+
+
 def _normal_map(f, node, scope, socket):
     space = node.space.removeprefix("BLENDER_")
     if space != node.space:
@@ -357,6 +369,7 @@ VALUES = {
     "ShaderNodeFloatCurve": _curves("Factor", "Value", combined_first=False),
     "ShaderNodeFresnel": _fresnel,
     "ShaderNodeLayerWeight": _layer_weight,
+    "ShaderNodeNormal": _normal_direction,
     "ShaderNodeNormalMap": _normal_map,
     "ShaderNodeBump": _bump,
     "ShaderNodeAmbientOcclusion": _occlusion,

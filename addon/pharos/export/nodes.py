@@ -36,12 +36,13 @@ NO_BUMP_BESIDE_DISPLACEMENT = (
 class Flattener:
     """One node tree on its way to a program: the context that node handlers work in."""
 
-    def __init__(self, native, images, report, owner: str, is_world: bool = False):
+    def __init__(self, native, images, report, owner: str, kind: str = "MATERIAL"):
         self.native = native
         self.images = images
         self.report = report
         self.owner = owner
-        self.is_world = is_world
+        self.kind = kind  # of the owner, as in report.KINDS
+        self.is_world = kind == "WORLD"
         self.version = compat.version_number()
         self.material_index = 0
         self.tilts_normal = True  # whether displacement does, as bump mapping
@@ -52,12 +53,20 @@ class Flattener:
         self._values: dict[tuple, Value] = {}
         self._under_way: set[tuple] = set()
 
+    def _place(self, node) -> tuple:
+        tree = node.id_data
+        return self.kind, "" if tree.is_embedded_data else tree.name, node.name
+
     def warn(self, message: str) -> None:
-        self.report.warn(self.owner, message)
+        self.report.warn(self.owner, message, self.kind)
+
+    def inform(self, node, message: str) -> None:
+        self.report.info(self.owner, message, *self._place(node))
 
     def unsupported(self, node, what: str = "") -> None:
         name = node.label or node.name
-        self.warn(f"Node {name!r} ({node.bl_label}){what and ': ' + what} is not supported.")
+        message = f"Node {name!r} ({node.bl_label}){what and ': ' + what} is not supported."
+        self.report.warn(self.owner, message, *self._place(node))
 
     # Inputs.
 
@@ -268,13 +277,13 @@ def flatten_displacement(native, images, report, material) -> Flattened | None:
 
 
 def flatten_light(native, images, report, light, matrix) -> Flattened:
-    flattener = Flattener(native, images, report, light.name)
+    flattener = Flattener(native, images, report, light.name, "LIGHT")
     flattener.lamp = LampSpace(light, matrix)
     return flattener.flatten(light.node_tree)
 
 
 def flatten_world(native, images, report, world, aovs=()) -> Flattened:
-    flattener = Flattener(native, images, report, world.name, is_world=True)
+    flattener = Flattener(native, images, report, world.name, "WORLD")
     flattener.aovs = dict(aovs)
     if world.use_nodes and world.node_tree is not None:
         return flattener.flatten(world.node_tree)

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+KINDS = ("OBJECT", "MATERIAL", "LIGHT", "WORLD", "MESH", "IMAGE", "VIEW_LAYER", "SCENE")
+
 
 class Entry(NamedTuple):
     severity: str  # INFO, WARNING or ERROR
     object: str
     message: str
+    kind: str = ""  # what `object` names, as in KINDS; empty where only the name is known
+    tree: str = ""  # of the node, where it is in a group's tree
+    node: str = ""
 
 
 class Report:
@@ -17,14 +22,15 @@ class Report:
     def __init__(self):
         self._entries: dict[Entry, None] = {}
 
-    def add(self, severity: str, name: str, message: str) -> None:
-        self._entries[Entry(severity, name, message)] = None
+    def add(self, severity: str, name: str, message: str, *place: str) -> None:
+        """`place`: kind, tree and node, as far as they are known."""
+        self._entries[Entry(severity, name, message, *place)] = None
 
-    def warn(self, name: str, message: str) -> None:
-        self.add("WARNING", name, message)
+    def warn(self, name: str, message: str, *place: str) -> None:
+        self.add("WARNING", name, message, *place)
 
-    def info(self, name: str, message: str) -> None:
-        self.add("INFO", name, message)
+    def info(self, name: str, message: str, *place: str) -> None:
+        self.add("INFO", name, message, *place)
 
     def add_native(self, entries) -> None:
         """Entries of a render session."""

@@ -88,27 +88,29 @@ def film_fields(native, scene, frame, crop) -> dict:
 def name_ignored_settings(scene, report) -> None:
     """Settings that change a picture in Cycles and do nothing here."""
     if scene.render.use_motion_blur:
-        report.warn(scene.name, "Motion blur is not supported.")
+        report.warn(scene.name, "Motion blur is not supported.", "SCENE")
     if scene.render.use_freestyle:
-        report.warn(scene.name, "Freestyle is not supported.")
+        report.warn(scene.name, "Freestyle is not supported.", "SCENE")
     name_light_linking(scene, report)
     cycles = _followed_cycles(scene)
     if cycles is None:
         return
     if cycles.use_denoising:
-        report.info(scene.name, "The picture is not denoised.")
+        report.info(scene.name, "The picture is not denoised.", "SCENE")
     if cycles.sample_clamp_direct > 0.0 or cycles.sample_clamp_indirect > 0.0:
-        report.info(scene.name, "Clamping of samples is not used.")
+        report.info(scene.name, "Clamping of samples is not used.", "SCENE")
     if cycles.use_fast_gi:
-        report.warn(scene.name, "Fast GI approximation is not supported.")
+        report.warn(scene.name, "Fast GI approximation is not supported.", "SCENE")
     if scene.render.film_transparent and cycles.film_transparent_glass:
-        report.warn(scene.name, "Transparent glass is not supported.")
+        report.warn(scene.name, "Transparent glass is not supported.", "SCENE")
     if cycles.blur_glossy > 0.0:
-        report.info(scene.name, "Filter glossy is not used.")
+        report.info(scene.name, "Filter glossy is not used.", "SCENE")
     if cycles.min_light_bounces > 0:
-        report.info(scene.name, "Minimum bounces are not used.")
+        report.info(scene.name, "Minimum bounces are not used.", "SCENE")
     if scene.render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull):
-        report.info(scene.name, "Culling of objects is not used.")
+        report.info(scene.name, "Culling of objects is not used.", "SCENE")
+    if scene.render.use_simplify and cycles.texture_limit_render != "OFF":
+        report.info(scene.name, "Textures keep their size.", "SCENE")
 
 
 def name_light_linking(scene, report) -> None:
@@ -118,4 +120,4 @@ def name_light_linking(scene, report) -> None:
         if linking is None:
             return
         if linking.receiver_collection is not None or linking.blocker_collection is not None:
-            report.warn(obj.name, "Light linking is not supported.")
+            report.warn(obj.name, "Light linking is not supported.", "OBJECT")

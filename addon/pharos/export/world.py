@@ -20,13 +20,15 @@ def _visibility_bits(native, world) -> int:
 
 def export_world(context) -> None:
     world = context.scene.world
-    if world is None:
+    if world is None or not context.view_layer.use_sky:
         return
     aovs = context.passes.aovs
     flat = flatten_world(context.native, context.images, context.report, world, aovs)
     cycles = getattr(world, "cycles", None)
     method = getattr(cycles, "sampling_method", "AUTOMATIC")
     manual = method == "MANUAL"
+    if getattr(cycles, "max_bounces", 1024) < 1024:
+        context.report.info(world.name, "Maximum bounces of a world are not used.", "WORLD")
     context.description.set_world(
         program=flat.program,
         map_resolution=getattr(cycles, "sample_map_resolution", 0) if manual else 0,

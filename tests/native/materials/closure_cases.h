@@ -147,6 +147,10 @@ inline std::vector<LobeCase> lobe_cases() {
         {"glass", node(setup_glass, Distribution::Ggx)},
         {"glass multi", node(setup_glass, Distribution::MultiGgx)},
         {"refraction", node(setup_refraction, Distribution::Ggx)},
+        {"glossy beckmann", node(setup_glossy, Distribution::Beckmann)},
+        {"glass beckmann", node(setup_glass, Distribution::Beckmann)},
+        {"refraction beckmann", node(setup_refraction, Distribution::Beckmann)},
+        {"glossy ashikhmin", node(setup_glossy, Distribution::AshikhminShirley)},
     };
     const auto special = [](Node setup, Distribution distribution, bool flag) {
         return [setup, distribution, flag](Random& r, float roughness_min) -> SurfaceSetup {
@@ -162,6 +166,9 @@ inline std::vector<LobeCase> lobe_cases() {
         };
     };
     cases.push_back({"anisotropic", special(setup_anisotropic, Distribution::Ggx, false)});
+    cases.push_back({"long beckmann", special(setup_anisotropic, Distribution::Beckmann, false)});
+    cases.push_back(
+        {"long ashikhmin", special(setup_anisotropic, Distribution::AshikhminShirley, false)});
     cases.push_back({"metallic", special(setup_metallic, Distribution::Ggx, false)});
     cases.push_back({"conductor", special(setup_metallic, Distribution::MultiGgx, true)});
     cases.push_back({"toon diffuse", special(setup_toon, Distribution::Ggx, false)});

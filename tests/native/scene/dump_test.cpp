@@ -79,6 +79,7 @@ SceneDescription full_description() {
     b.description().instance_attributes = {{"object:wear", {Vec4(0.25f), Vec4(1, 2, 3, 4)}}};
     b.description().materials[0].program.ops[0].step = Vec2(0.1f, 0.0f);
     b.description().lights[0].program = 0;
+    b.description().lights[0].is_portal = true;
     b.description().light_programs = {emission_program(Rgb(0.5f), 2.0f)};
     b.description().materials[0].displacement = emission_program(Rgb(0.1f), 1.0f);
     b.description().materials[0].program.images.at(0).tiles = {{12, 3}};
@@ -125,6 +126,7 @@ TEST(Dump, RoundTripIsBitEqual) {
     EXPECT_EQ(back.passes.mist_falloff, 0.5f);
     EXPECT_EQ(back.passes.object_indices, (std::vector<std::uint32_t>{7, 8}));
     EXPECT_EQ(back.lights.at(0).program, 0u);
+    EXPECT_TRUE(back.lights.at(0).is_portal);
     EXPECT_EQ(back.lights.at(1).program, kNone);
     EXPECT_EQ(back.light_programs.at(0).ops.at(0).code, NodeOpCode::Emission);
     EXPECT_EQ(back.materials.at(0).displacement.ops.size(), 1u);
@@ -141,6 +143,20 @@ void forget_attributes(SceneDescription& description) {
     for (MaterialDescription& material : description.materials) {
         for (NodeOp& op : material.program.ops) {
             op.step = Vec2(0.0f);
+        }
+    }
+}
+
+void forget_version_4(SceneDescription& description) {
+    description.passes.aovs.clear();
+    description.light_programs.clear();
+    for (LightDescription& light : description.lights) {
+        light.program = kNone;
+    }
+    for (MaterialDescription& material : description.materials) {
+        material.displacement = {};
+        for (ImageUse& use : material.program.images) {
+            use.tiles.clear();
         }
     }
 }
@@ -164,16 +180,11 @@ TEST(Dump, FilesOfOlderVersionsAreRead) {
         std::memcpy(&bytes[16], &size, sizeof(size));
         std::memcpy(&bytes[24], &checksum, sizeof(checksum));
         description.passes = version < 2 ? PassesDescription() : description.passes;
-        description.passes.aovs.clear();
-        description.light_programs.clear();
         for (LightDescription& light : description.lights) {
-            light.program = kNone;
+            light.is_portal = false;
         }
-        for (MaterialDescription& material : description.materials) {
-            material.displacement = {};
-            for (ImageUse& use : material.program.images) {
-                use.tiles.clear();
-            }
+        if (version < 4) {
+            forget_version_4(description);
         }
         if (version < 3) {
             forget_attributes(description);
