@@ -18,9 +18,10 @@ from . import (  # noqa: E402
     operators,
     panels,
     properties,
+    running,
 )
 
-_PARTS = (properties, engine, operators, lobes, panels, compare, handlers, checkpoints)
+_PARTS = (properties, engine, operators, lobes, panels, compare, handlers, checkpoints, running)
 
 
 def register():
