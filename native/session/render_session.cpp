@@ -15,6 +15,7 @@
 #include "core/cancel.h"
 #include "core/checksum.h"
 #include "core/fp_state.h"
+#include "core/memory.h"
 #include "integrator/integrator.h"
 #include "scene/scene.h"
 #include "scene/scene_hash.h"
