@@ -22,12 +22,12 @@ _RENDER_ARGUMENTS = {"-f", "--render-frame", "-a", "--render-anim"}
 def write_report(scene, entries) -> None:
     """Replace a scene's report where it has changed."""
     report = scene.pharos.report
-    if [(e.severity, e.object, e.message) for e in report] == [tuple(e) for e in entries]:
+    if [(e.severity, e.object, e.message, e.missing) for e in report] == list(map(tuple, entries)):
         return
     report.clear()
     for entry in entries:
         item = report.add()
-        item.severity, item.object, item.message = entry
+        item.severity, item.object, item.message, item.missing = entry
 
 
 def post_report(scene_name: str, entries) -> None:

@@ -32,6 +32,7 @@ class PharosReportEntry(bpy.types.PropertyGroup):
     )
     object: StringProperty(name="Name", description="What it is about")
     message: StringProperty(name="Message")
+    missing: BoolProperty(name="Missing", description="A file is not there or cannot be used")
 
 
 def _bounces(name: str, description: str, default: int = 12):

@@ -9,6 +9,7 @@ class Entry(NamedTuple):
     severity: str  # INFO, WARNING or ERROR
     object: str
     message: str
+    missing: bool = False  # a file that the scene needs is not there or cannot be used
 
 
 class Report:
@@ -17,8 +18,8 @@ class Report:
     def __init__(self):
         self._entries: dict[Entry, None] = {}
 
-    def add(self, severity: str, name: str, message: str) -> None:
-        self._entries[Entry(severity, name, message)] = None
+    def add(self, severity: str, name: str, message: str, missing: bool = False) -> None:
+        self._entries[Entry(severity, name, message, missing)] = None
 
     def warn(self, name: str, message: str) -> None:
         self.add("WARNING", name, message)
@@ -29,7 +30,7 @@ class Report:
     def add_native(self, entries) -> None:
         """Entries of a render session."""
         for entry in entries:
-            self.add(entry.severity.name.upper(), entry.object, entry.message)
+            self.add(entry.severity.name.upper(), entry.object, entry.message, entry.missing)
 
     @property
     def entries(self) -> list[Entry]:
