@@ -26,10 +26,17 @@ def announced():
         _stops.pop(thread, None)
 
 
+def ask_all() -> bool:
+    """Ask all renders to stop; False where there are none."""
+    stops = list(_stops.values())
+    for stop in stops:
+        stop.set()
+    return bool(stops)
+
+
 def end_all() -> None:
     """Ask all renders to stop, and wait for the threads of others."""
-    for stop in list(_stops.values()):
-        stop.set()
+    ask_all()
     others = [_THREADS / str(thread) for thread in _stops if thread != threading.get_native_id()]
     deadline = time.monotonic() + _PATIENCE
     while any(thread.exists() for thread in others) and time.monotonic() < deadline:
