@@ -249,5 +249,5 @@ suite_tsan() {
     mapfile -t modules < <(tested_modules session core film)
     build_or_fail tsan "${modules[@]/%/_test}" || return
     TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \
-        run_programs tsan 600 tsan "${modules[@]}"
+        run_programs tsan 1500 tsan "${modules[@]}"
 }
