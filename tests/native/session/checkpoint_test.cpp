@@ -22,7 +22,7 @@ using namespace pharos::testing;
 
 constexpr std::uint32_t kSize = 40;
 constexpr std::uint32_t kSamples = 40;
-constexpr std::uint64_t kStride = kSlowdown > 1.0 ? 25 : 7;  // batches between two cuts
+constexpr std::uint64_t kStride = kSlowdown > 1.0 ? 14 : 7;  // batches between two cuts
 
 SceneDescription scene(GuidingMode guiding) {
     SceneDescription d = two_rooms(kSize, kSize - 9, kSamples);
