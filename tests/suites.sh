@@ -186,7 +186,7 @@ suite_fuzz() {
         mkdir -p "$LOGS/corpus_$target"
         ASAN_OPTIONS=detect_leaks=0 check "fuzz_$target" 180 \
             "$PHAROS_ROOT/build/fuzz/tests/fuzz/fuzz_$target" "-max_total_time=${PHAROS_FUZZ_SECONDS:-10}" \
-            -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
+            -len_control=0 -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
     done
 }
 
