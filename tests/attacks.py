@@ -293,7 +293,8 @@ def fuzz(table: Table, seconds: int) -> None:
         shutil.rmtree(corpus, ignore_errors=True)
         corpus.mkdir(parents=True)
         command = [ROOT / "build" / "fuzz" / "tests" / "fuzz" / f"fuzz_{name}",
-                   f"-max_total_time={seconds}", "-rss_limit_mb=4096", "-timeout=25",
+                   f"-max_total_time={seconds}", "-len_control=0", "-rss_limit_mb=4096",
+                   "-timeout=25",
                    "-print_final_stats=1", f"-artifact_prefix={LOGS}/{name}_", corpus]
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
                               errors="replace", check=False, timeout=seconds + 300,

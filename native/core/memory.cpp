@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <fstream>
 #include <limits>
+#include <new>
 #include <string>
+#include <system_error>
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -41,6 +43,13 @@ std::uint64_t address_space_left() {
 
 std::uint64_t available_memory() {
     return std::min(address_space_left(), read_kilobytes("/proc/meminfo", "MemAvailable:"));
+}
+
+bool is_out_of_memory(const std::exception& error) {
+    const auto* system = dynamic_cast<const std::system_error*>(&error);
+    return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+           (system != nullptr && (system->code() == std::errc::resource_unavailable_try_again ||
+                                  system->code() == std::errc::not_enough_memory));
 }
 
 }  // namespace pharos

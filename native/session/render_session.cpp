@@ -217,10 +217,8 @@ void RenderSession::Impl::run(SceneDescription description) {
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const Cancelled&) {
         end(SessionState::Cancelled, {});
-    } catch (const std::bad_alloc&) {
-        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
-        end(SessionState::Failed, error.what());
+        end(SessionState::Failed, is_out_of_memory(error) ? kOutOfMemory : error.what());
     }
 }
 
@@ -234,10 +232,8 @@ void RenderSession::Impl::run_built(const BuiltScene& built) {
         }
         render(built.scene, RenderIdentity{}, &built);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
-    } catch (const std::bad_alloc&) {
-        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
-        end(SessionState::Failed, error.what());
+        end(SessionState::Failed, is_out_of_memory(error) ? kOutOfMemory : error.what());
     }
 }
 
