@@ -1,6 +1,6 @@
 """Builds the scenes named after `--` (without names: all) into this folder; for Blender 3.4.1.
 
-    blender -b --factory-startup --python-exit-code 3 -P scenes/build_scenes.py -- cornell door
+    blender -b --factory-startup -Y --python-exit-code 3 -P scenes/build_scenes.py -- cornell door
 """
 
 import importlib

@@ -6,6 +6,7 @@ A program that ends badly is a row of its own, so that nothing is lost in silenc
 from __future__ import annotations
 
 import os
+import random
 import resource
 import shutil
 import signal
@@ -19,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 NATIVE = ROOT / "build" / "release" / "tests" / "native"
 CLI = ROOT / "build" / "release" / "native" / "pharos-cli"
 LOGS = ROOT / "build" / "stress"
-FUZZERS = ("dump", "program", "image", "state")
+FUZZERS = ("dump", "scene", "program", "image", "state")
 NUMBERS = {
     "film": "Film.AMillion*",
     "camera": "Camera.Any*",
@@ -88,6 +89,42 @@ def sizes(table: Table) -> None:
 
 def cancel(table: Table) -> None:
     gtest(table, "cancel", "session", "Cancel.*", PHAROS_LONG_TESTS="1")
+    blender_script(table, "cancel", "test_cancel.py", PHAROS_LONG_TESTS="1")
+    with tempfile.TemporaryDirectory() as name:
+        interrupt_programs(table, Path(name), 40)
+
+
+def interrupt_programs(table: Table, folder: Path, cases: int) -> None:
+    """pharos-cli by SIGINT anywhere between its start and its end, the writing of its files too."""
+    scene, rng = write_scene(folder), random.Random(11)
+    command = [str(word) for word in (
+        CLI, "render", scene, "-o", folder / "x.exr", "--samples", "16", "--threads", "2",
+        "--checkpoint", folder / "kept", "--checkpoint-interval", "0")]
+    began = time.monotonic()
+    subprocess.run(command, check=True, capture_output=True)
+    whole = time.monotonic() - began
+    worst, wrong, pictures = 0.0, 0, 0
+    for _ in range(cases):
+        for file in folder.glob("[xk]*"):
+            file.unlink()
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(rng.uniform(0.0, 1.1 * whole))
+        asked = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        code = process.wait(60)
+        worst = max(worst, time.monotonic() - asked)
+        picture = (folder / "x.exr").exists()
+        pictures += picture
+        readable = not picture or subprocess.run(
+            ["oiiotool", "--stats", folder / "x.exr"], capture_output=True, check=False
+        ).returncode == 0
+        # Before its signals are caught the program ends as any other.
+        expected = (0, 130) if picture else (130, -signal.SIGINT)
+        wrong += code not in expected or not readable or any(folder.glob("*.part"))
+    table.add("cancel", "SIGINT to pharos-cli at random moments: worst seconds", str(cases),
+              worst, 1.0)
+    table.add("cancel", f"torn pictures, wrong codes, parts left (pictures: {pictures})",
+              str(cases), wrong, 0)
 
 
 def blender_script(table: Table, attack: str, script: str, **variables) -> None:
@@ -101,9 +138,20 @@ def blender_script(table: Table, attack: str, script: str, **variables) -> None:
     run(table, attack, script.removesuffix(".py"), command, 1500, **variables)
 
 
+def window_script(table: Table, attack: str, script: str) -> None:
+    """In a window, as run_all.py starts it."""
+    command = ["/usr/bin/python3", "-c", (
+        f"import sys; sys.path.insert(0, {str(ROOT / 'tests' / 'blender')!r}); import run_all; "
+        "from pathlib import Path; import subprocess; env = run_all.environment(); "
+        f"sys.exit(subprocess.run(run_all.command('window', Path(run_all.HERE / {script!r}), env), "
+        "env=env).returncode)")]
+    run(table, attack, script.removesuffix(".py"), command, 600)
+
+
 def soak(table: Table) -> None:
     blender_script(table, "soak", "test_soak.py", PHAROS_SOAK="1")
     blender_script(table, "soak", "test_robustness.py")
+    window_script(table, "soak", "test_interruptions.py")
 
 
 def write_scene(folder: Path) -> Path:
@@ -245,7 +293,8 @@ def fuzz(table: Table, seconds: int) -> None:
         shutil.rmtree(corpus, ignore_errors=True)
         corpus.mkdir(parents=True)
         command = [ROOT / "build" / "fuzz" / "tests" / "fuzz" / f"fuzz_{name}",
-                   f"-max_total_time={seconds}", "-rss_limit_mb=4096", "-timeout=25",
+                   f"-max_total_time={seconds}", "-len_control=0", "-rss_limit_mb=4096",
+                   "-timeout=25",
                    "-print_final_stats=1", f"-artifact_prefix={LOGS}/{name}_", corpus]
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
                               errors="replace", check=False, timeout=seconds + 300,

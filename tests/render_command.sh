@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
-# scenes/render as a user meets it: two pictures, a second run without building, both signals.
+# scenes/render as a user meets it: two pictures, a second run without building, both signals, and
+# an exit code for each way to fail.
 # Ends with a line 'N passed, N failed'.
 set -u
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 renders=$root/build/renders
+export BLENDER=${BLENDER:-blender} BLENDER_USER_SCRIPTS=$root/build/blender
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 passed=0 failed=0
@@ -78,6 +80,102 @@ expect "the EXR has light" has_light "$renders/cornell.exr"
 expect "the PNG has light" has_light "$renders/cornell.png"
 expect "SIGINT keeps the picture and ends with 130" stops_on INT 130
 expect "SIGTERM keeps the picture and ends with 143" stops_on TERM 143
-expect "a missing file is an error" bash -c "! '$root/scenes/render' '$scratch/none.blend' >/dev/null 2>&1"
+
+# ends_with CODE ARGUMENTS...: without a path on stdout, but with a reason.
+ends_with() {
+    local code=$1 status
+    shift
+    "$root/scenes/render" "$@" >"$scratch/said" 2>"$scratch/reason.err" </dev/null
+    status=$?
+    said="status $status"
+    [ "$status" = "$code" ] && [ ! -s "$scratch/said" ] && [ -s "$scratch/reason.err" ]
+}
+
+# make_scene NAME: the Cornell box, changed by the Python on stdin, as a file of its own.
+make_scene() {
+    { printf 'import bpy, os\nscene, scratch = bpy.context.scene, os.environ["SCRATCH"]\n' && cat &&
+        printf '\nbpy.ops.wm.save_as_mainfile(filepath=f"{scratch}/%s.blend")\n' "$1"; } >"$scratch/make.py"
+    SCRATCH=$scratch "$BLENDER" -b --factory-startup -Y --addons pharos "$root/scenes/cornell.blend" \
+        --python-exit-code 3 -P "$scratch/make.py" >"$scratch/$1.err" 2>&1
+}
+
+without_memory() {
+    (ulimit -v 6000000 && ends_with 4 "$@") && grep -q "Out of memory" "$scratch/reason.err"
+}
+
+# Where the picture goes there is something that cannot be replaced.
+unwritable() {
+    local status
+    mkdir -p "$renders/blocked.exr/something"
+    ends_with 5 "$@"
+    status=$?
+    rm -rf "$renders/blocked.exr"
+    return "$status"
+}
+
+# A scene that tries to run code when it is opened, and to write files elsewhere when it is rendered.
+mkdir -p "$scratch/elsewhere"
+make_scene hostile <<'END'
+code = f"import pathlib; pathlib.Path('{scratch}/elsewhere/ran').touch()"
+text = bpy.data.texts.new("start.py")
+text.write(code)
+text.use_module = True
+scene.use_nodes = True
+output = scene.node_tree.nodes.new("CompositorNodeOutputFile")
+output.base_path = f"{scratch}/elsewhere"
+layers = next(n for n in scene.node_tree.nodes if n.bl_idname == "CompositorNodeRLayers")
+scene.node_tree.links.new(layers.outputs[0], output.inputs[0])
+scene.render.filepath = f"{scratch}/elsewhere/frame_"
+scene.pharos.samples = 2
+scene.pharos.use_checkpoint = True
+END
+
+# The scene as a Blender opens it that trusts it: what is looked for below does happen there.
+is_hostile() {
+    rm -f "$scratch"/elsewhere/*
+    "$BLENDER" -b --factory-startup -y --addons pharos "$scratch/hostile.blend" -E PHAROS -f 1 \
+        >"$scratch/trusted.err" 2>&1
+    [ -e "$scratch/elsewhere/ran" ] && [ "$(find "$scratch/elsewhere" -type f | wc -l)" -ge 2 ]
+}
+
+does_no_harm() {
+    rm -f "$scratch"/elsewhere/*
+    "$root/scenes/render" "$scratch/hostile.blend" -s 2 >"$scratch/paths" 2>"$scratch/hostile.err" &&
+        [ -z "$(find "$scratch/elsewhere" -type f)" ] &&
+        [ -z "$(find "$renders" -name 'hostile*checkpoint*')" ]
+}
+
+expect "a scene that runs code and writes files, where it is trusted" is_hostile
+expect "runs no code and writes nothing outside of the folder here" does_no_harm
+
+expect "a missing file is an error" ends_with 1 "$scratch/none.blend"
+head -c 20000 "$root/scenes/cornell.blend" >"$scratch/torn.blend"
+expect "a torn file is an error" ends_with 1 "$scratch/torn.blend"
+make_scene blind <<<"scene.camera = None"
+expect "a scene without a camera is an error" ends_with 1 "$scratch/blind.blend"
+expect "an unknown option is a wrong argument" ends_with 2 --no-such-option
+expect "a number that is none is a wrong argument" ends_with 2 -s many
+expect "no samples are a wrong argument" ends_with 2 -s 0
+make_scene lost <<'END'
+image = bpy.data.images.new("Lost", 4, 4)
+image.source, image.filepath = "FILE", f"{scratch}/nowhere.png"
+for tree in (m.node_tree for m in bpy.data.materials if m.use_nodes):
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    for socket in [s for n in tree.nodes for s in n.inputs if s.name in ("Base Color", "Color")]:
+        tree.links.new(texture.outputs[0], socket)
+END
+expect "a missing image is an error when asked for" ends_with 3 "$scratch/lost.blend" -s 1 --strict
+renders_anyway() {
+    "$root/scenes/render" "$@" >"$scratch/said" 2>"$scratch/anyway.err"
+}
+expect "and none otherwise" renders_anyway "$scratch/lost.blend" -s 1
+make_scene huge <<'END'
+scene.render.resolution_x = scene.render.resolution_y = 16384
+scene.render.resolution_percentage = 100
+END
+expect "what does not fit is out of memory" without_memory "$scratch/huge.blend" -s 1
+make_scene blocked <<<""
+expect "a picture that cannot be written says so" unwritable "$scratch/blocked.blend" -s 1
 echo "$passed passed, $failed failed"
 [ "$failed" = 0 ]

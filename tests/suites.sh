@@ -12,10 +12,11 @@ native   the C++ unit tests (ctest without the label slow)
 blender  tests/blender in Blender 3.4.1, with and without a window, and in bpy 4.5
 render   scenes/render: two pictures, a second run without building, Ctrl-C and SIGTERM
 slurm    a Slurm of two slots renders shards of a picture; skipped where it is not installed
-fuzz     libFuzzer on dumps, node programs, images, weights and checkpoints, some seconds each
+fuzz     libFuzzer on scenes as handed over, dumps, node programs, images, weights and checkpoints, some seconds each
 tidy     clang-tidy; files seen before are not looked at again, within a budget of time
 asan     unit tests under the address and undefined-behaviour sanitizers
-tsan     tests of threads, integrator and session under the thread sanitizer
+tsan     tests of threads, film and session under the thread sanitizer
+blasan   renders and a viewport in Blender 3.4.1 with the address sanitizer in it
 END
 }
 
@@ -178,14 +179,14 @@ suite_slurm() {
 
 # What a fuzzer finds lies in build/tests, to be run again by the same program.
 suite_fuzz() {
-    local target targets=(dump program image state)
+    local target targets=(dump scene program image state)
     build_or_fail fuzz "${targets[@]/#/fuzz_}" || return
     for target in "${targets[@]}"; do
         rm -rf "$LOGS/corpus_$target"
         mkdir -p "$LOGS/corpus_$target"
         ASAN_OPTIONS=detect_leaks=0 check "fuzz_$target" 180 \
             "$PHAROS_ROOT/build/fuzz/tests/fuzz/fuzz_$target" "-max_total_time=${PHAROS_FUZZ_SECONDS:-10}" \
-            -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
+            -len_control=0 -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
     done
 }
 
@@ -218,10 +219,35 @@ suite_asan() {
         run_programs asan 900 asan "${modules[@]}"
 }
 
+# assemble_sanitized: an add-on whose native part is the sanitized one, and a Blender that can load it.
+assemble_sanitized() {
+    local folder=$PHAROS_ROOT/build/asan/blender module
+    module=$(compgen -G "$PHAROS_ROOT/build/asan/native/_native.*.so") || return
+    rm -rf "$folder"
+    mkdir -p "$folder/addons"
+    cp -r "$PHAROS_ROOT/addon/pharos" "$folder/addons/pharos"
+    cp "$module" "$folder/addons/pharos/"
+    printf '#!/bin/sh\nLD_PRELOAD=%s exec "%s" "$@"\n' "$(g++ -print-file-name=libasan.so)" \
+        "$(command -v "$BLENDER")" >"$folder/blender"
+    chmod +x "$folder/blender"
+}
+
+# Blender itself loses memory at its end: what is looked for are accesses that are wrong.
+suite_blasan() {
+    local folder=$PHAROS_ROOT/build/asan/blender
+    build_or_fail asan _native || return
+    assemble_sanitized || { count 0 1; blame "no sanitized add-on"; return; }
+    BLENDER=$folder/blender BLENDER_USER_SCRIPTS=$folder PHAROS_TEST_HOSTS="blender window" \
+        PHAROS_TEST_TIMEOUT=900 UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1 \
+        ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:exitcode=99 \
+        counted blasan 2400 /usr/bin/python3 "$PHAROS_ROOT/tests/blender/run_all.py" \
+        test_robustness test_interruptions test_viewport.py
+}
+
 suite_tsan() {
     local modules
     mapfile -t modules < <(tested_modules session core film)
     build_or_fail tsan "${modules[@]/%/_test}" || return
     TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \
-        run_programs tsan 600 tsan "${modules[@]}"
+        run_programs tsan 1500 tsan "${modules[@]}"
 }

@@ -19,9 +19,21 @@ from . import (  # noqa: E402
     panels,
     properties,
     report_rows,
+    running,
 )
 
-_PARTS = (properties, engine, operators, lobes, report_rows, panels, compare, handlers, checkpoints)
+_PARTS = (
+    properties,
+    engine,
+    operators,
+    lobes,
+    report_rows,
+    panels,
+    compare,
+    handlers,
+    checkpoints,
+    running,
+)
 
 
 def register():

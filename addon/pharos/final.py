@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import bpy
 
-from . import checkpoints, compat, handlers, operators, output
+from . import checkpoints, compat, handlers, operators, output, running
 from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
@@ -45,14 +47,25 @@ class Termination:
             signal.signal(signal.SIGTERM, before)
 
 
+class Ends(NamedTuple):
+    """Who may end a render beside Blender itself."""
+
+    termination: Termination
+    switched_off: threading.Event  # the add-on is
+
+    @property
+    def asked(self) -> bool:
+        return self.termination.asked or self.switched_off.is_set()
+
+
 class FinalRender:
     """One view layer (and stereo view) of one frame."""
 
-    def __init__(self, engine, depsgraph, native, termination: Termination):
+    def __init__(self, engine, depsgraph, native, ends: Ends):
         self._engine = engine
         self._depsgraph = depsgraph
         self._native = native
-        self._termination = termination
+        self._ends = ends
         self._scene = depsgraph.scene_eval
         self._layer = depsgraph.view_layer_eval
         self._report = Report()
@@ -86,7 +99,7 @@ class FinalRender:
             self._post_report()
 
     def _should_stop(self) -> bool:
-        return self._termination.asked or self._engine.test_break()
+        return self._ends.asked or self._engine.test_break()
 
     def _export(self, frame, crop):
         engine, scene = self._engine, self._scene
@@ -220,12 +233,13 @@ def render(engine, depsgraph, native) -> None:
     termination = Termination()
     settings = depsgraph.scene.render
     views = [view.name for view in settings.views if view.use] if settings.use_multiview else [""]
-    with termination.caught():
+    with termination.caught(), running.announced() as switched_off:
+        ends = Ends(termination, switched_off)
         for view in views:
             if view:
                 engine.active_view_set(view)
-            FinalRender(engine, depsgraph, native, termination).run(view)
-            if termination.asked or engine.test_break():
+            FinalRender(engine, depsgraph, native, ends).run(view)
+            if ends.asked or engine.test_break():
                 break
         if termination.asked:
             # Blender itself would go on and end with 0.

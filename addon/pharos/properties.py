@@ -35,6 +35,7 @@ class PharosReportEntry(bpy.types.PropertyGroup):
     kind: StringProperty(name="Kind", description="What the name is one of")
     tree: StringProperty(name="Group", description="The group that the node is in")
     node: StringProperty(name="Node")
+    missing: BoolProperty(name="Missing", description="A file is not there or cannot be used")
 
 
 def _bounces(name: str, description: str, default: int = 12):

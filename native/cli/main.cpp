@@ -2,12 +2,12 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
-#include <new>
 #include <string>
 #include <vector>
 
 #include "cli/commands.h"
 #include "core/atomic_file.h"
+#include "core/memory.h"
 
 namespace {
 
@@ -91,14 +91,12 @@ int main(int argc, char** argv) {
     } catch (const pharos::cli::MissingAsset& error) {
         complain(error.what());
         return pharos::cli::kExitMissingAsset;
-    } catch (const std::bad_alloc&) {
-        complain("out of memory: the scene does not fit");
-        return pharos::cli::kExitOutOfMemory;
     } catch (const pharos::WriteError& error) {
         complain(error.what());
         return pharos::cli::kExitNotWritten;
     } catch (const std::exception& error) {
-        complain(error.what());
-        return pharos::cli::kExitError;
+        const bool memory = pharos::is_out_of_memory(error);
+        complain(memory ? "out of memory: the scene does not fit" : error.what());
+        return memory ? pharos::cli::kExitOutOfMemory : pharos::cli::kExitError;
     }
 }

@@ -6,23 +6,41 @@
 
 namespace pharos {
 
+namespace {
+
+// Tells the workers to end, and joins them while the members they use still live.
+void end_workers(std::mutex& mutex,
+                 bool& stop,
+                 std::condition_variable& wake,
+                 std::vector<std::jthread>& workers) {
+    {
+        const std::lock_guard lock(mutex);
+        stop = true;
+    }
+    wake.notify_all();
+    workers.clear();
+}
+
+}  // namespace
+
 ThreadPool::ThreadPool(unsigned threads) {
     if (threads == 0) {
         threads = std::max(1u, std::thread::hardware_concurrency());
     }
     workers_.reserve(threads - 1);
-    for (unsigned worker = 1; worker < threads; ++worker) {
-        workers_.emplace_back([this, worker] { work(worker); });
+    try {
+        for (unsigned worker = 1; worker < threads; ++worker) {
+            workers_.emplace_back([this, worker] { work(worker); });
+        }
+    } catch (...) {
+        // Those that there are wait for work, and would be waited for.
+        end_workers(mutex_, stop_, wake_, workers_);
+        throw;
     }
 }
 
 ThreadPool::~ThreadPool() {
-    {
-        const std::lock_guard lock(mutex_);
-        stop_ = true;
-    }
-    wake_.notify_all();
-    workers_.clear();  // joins, while the members the workers use still live
+    end_workers(mutex_, stop_, wake_, workers_);
 }
 
 void ThreadPool::call(unsigned worker) {

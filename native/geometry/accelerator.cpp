@@ -26,10 +26,11 @@ constexpr std::uint32_t kCancelPollInterval = 1u << 16;  // vertices or triangle
 constexpr std::size_t kCacheTrial = 64;                  // rays
 
 // Copies a mesh into buffers of Embree's own, transformed unless `to_world` is null.
-GeometryPtr make_triangles(RTCDevice device,
+GeometryPtr make_triangles(const EmbreeDevice& owner,
                            const Mesh& mesh,
                            const Mat4* to_world,
                            const CancelFlag& cancel) {
+    RTCDevice device = owner.device.get();
     GeometryPtr geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
     auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(),
                                                                  RTC_BUFFER_TYPE_VERTEX,
@@ -43,7 +44,7 @@ GeometryPtr make_triangles(RTCDevice device,
                                                                           RTC_FORMAT_UINT3,
                                                                           3 * sizeof(std::uint32_t),
                                                                           mesh.triangles.size()));
-    throw_if_failed(rtcGetDeviceError(device));
+    throw_if_failed(owner, rtcGetDeviceError(device));
     CHECK(vertices != nullptr && triangles != nullptr);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         if (i % kCancelPollInterval == 0) {
@@ -184,7 +185,7 @@ std::shared_ptr<const MeshTree> build_tree(const std::shared_ptr<EmbreeDevice>& 
     const auto tree = std::make_shared<MeshTree>();
     tree->device = device;
     tree->scene = make_scene(*device);
-    tree->triangles = make_triangles(device->device.get(), mesh, nullptr, cancel);
+    tree->triangles = make_triangles(*device, mesh, nullptr, cancel);
     rtcSetGeometryMask(tree->triangles.get(), 0xffffffffu);
     rtcCommitGeometry(tree->triangles.get());
     rtcAttachGeometryByID(tree->scene.get(), tree->triangles.get(), 0);
@@ -226,7 +227,8 @@ struct Accelerator::Impl {
     void build(std::span<const Mesh> meshes,
                std::span<const Instance> instances,
                const CancelFlag& cancel,
-               MeshTrees::Impl* kept);
+               MeshTrees::Impl* kept,
+               std::uint64_t most_bytes);
     void attach(std::uint32_t index, const GeometryPtr& geometry, std::uint32_t visibility) const;
     void occluded_cached(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
     void remember(const RTCHit& hit, OccluderCache& cache) const;
@@ -320,8 +322,10 @@ Trees make_trees(const std::shared_ptr<EmbreeDevice>& device,
 void Accelerator::Impl::build(std::span<const Mesh> meshes,
                               std::span<const Instance> instances,
                               const CancelFlag& cancel,
-                              MeshTrees::Impl* kept) {
+                              MeshTrees::Impl* kept,
+                              std::uint64_t most_bytes) {
     structure->device = kept != nullptr ? kept->device : std::make_shared<EmbreeDevice>();
+    structure->device->allow(most_bytes);
     RTCDevice device = structure->device->device.get();
     const std::vector<std::uint32_t> uses = count_mesh_uses(meshes.size(), instances);
     structure->trees = make_trees(structure->device, meshes, uses, kept, cancel);
@@ -342,13 +346,14 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
             traced[i] = traced_triangles(tree->triangles.get(), &instance.to_world);
             ++primitives;
         } else {
-            const GeometryPtr triangles = make_triangles(device, mesh, &instance.to_world, cancel);
+            const GeometryPtr triangles =
+                make_triangles(*structure->device, mesh, &instance.to_world, cancel);
             traced[i] = traced_triangles(triangles.get(), nullptr);
             attach(i, triangles, instance.visibility);
             primitives += mesh.triangles.size();
         }
     }
-    throw_if_failed(rtcGetDeviceError(device));
+    throw_if_failed(*structure->device, rtcGetDeviceError(device));
     commit_scene({structure, structure->device, scene}, primitives, cancel);
 
     RTCBounds b;
@@ -360,7 +365,8 @@ void Accelerator::Impl::build(std::span<const Mesh> meshes,
 Accelerator::Accelerator(std::span<const Mesh> meshes,
                          std::span<const Instance> instances,
                          const CancelFlag& cancel,
-                         MeshTrees* kept)
+                         MeshTrees* kept,
+                         std::uint64_t most_bytes)
     : impl_(std::make_unique<Impl>()) {
     for (const Instance& instance : instances) {
         if (instance.mesh >= meshes.size()) {
@@ -368,7 +374,7 @@ Accelerator::Accelerator(std::span<const Mesh> meshes,
         }
     }
     const FloatStateGuard float_state;
-    impl_->build(meshes, instances, cancel, kept != nullptr ? &kept->impl() : nullptr);
+    impl_->build(meshes, instances, cancel, kept != nullptr ? &kept->impl() : nullptr, most_bytes);
 }
 
 Accelerator::~Accelerator() = default;

@@ -3,10 +3,11 @@
 // Meshes used once are traced in world space; a mesh used more often is stored once and instanced.
 // For a scene that is edited all are instanced, and their structures are kept (mesh_trees.h).
 // Robust traversal. Rays with non-finite members miss. Building polls `cancel` and throws
-// Cancelled; out of memory throws std::bad_alloc.
+// Cancelled; out of memory, or of the bytes it may take, throws std::bad_alloc.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -47,7 +48,8 @@ class Accelerator {
     Accelerator(std::span<const Mesh> meshes,
                 std::span<const Instance> instances,
                 const CancelFlag& cancel,
-                MeshTrees* kept = nullptr);
+                MeshTrees* kept = nullptr,
+                std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max());
     ~Accelerator();
     Accelerator(const Accelerator&) = delete;
     Accelerator& operator=(const Accelerator&) = delete;

@@ -1,7 +1,9 @@
 #include "geometry/embree_build.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <new>
 #include <stdexcept>
@@ -20,15 +22,28 @@ constexpr std::size_t kShortBuild = 100000;  // triangles or instances, tens of 
 constexpr std::chrono::milliseconds kPollInterval(5);
 constexpr std::chrono::milliseconds kPatience(100);  // with a build that has been told to stop
 
-bool on_memory(void* user, ssize_t change, bool /*post*/) {
+bool on_memory(void* user, ssize_t change, bool post) {
     auto& device = *static_cast<EmbreeDevice*>(user);
-    device.bytes.fetch_add(change, std::memory_order_relaxed);
-    // A refused allocation ends a build early; releases are never refused.
-    return change <= 0 || !device.stop.load(std::memory_order_relaxed);
+    const std::int64_t bytes = device.bytes.fetch_add(change, std::memory_order_relaxed) + change;
+    if (change <= 0) {
+        return true;  // a release
+    }
+    if (bytes > device.most_bytes.load(std::memory_order_relaxed)) {
+        device.full.store(true, std::memory_order_relaxed);
+    }
+    // A refused allocation ends a build early.
+    const bool granted = !device.full.load(std::memory_order_relaxed) &&
+                         !device.stop.load(std::memory_order_relaxed);
+    if (!granted && !post) {
+        device.bytes.fetch_sub(change, std::memory_order_relaxed);  // it is never made
+    }
+    return granted;
 }
 
 bool on_progress(void* user, double /*fraction*/) {
-    return !static_cast<const EmbreeDevice*>(user)->stop.load(std::memory_order_relaxed);
+    const auto& device = *static_cast<const EmbreeDevice*>(user);
+    return !device.full.load(std::memory_order_relaxed) &&
+           !device.stop.load(std::memory_order_relaxed);
 }
 
 struct Commit {
@@ -101,6 +116,13 @@ EmbreeDevice::EmbreeDevice() : device(rtcNewDevice(nullptr)) {
     rtcSetDeviceMemoryMonitorFunction(device.get(), on_memory, this);
 }
 
+void EmbreeDevice::allow(std::uint64_t more) {
+    const std::int64_t used = bytes.load(std::memory_order_relaxed);
+    const auto rest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max() - used);
+    most_bytes.store(used + static_cast<std::int64_t>(std::min(more, rest)),
+                     std::memory_order_relaxed);
+}
+
 ScenePtr make_scene(EmbreeDevice& device) {
     ScenePtr scene(rtcNewScene(device.device.get()));
     if (scene == nullptr) {
@@ -118,13 +140,16 @@ void throw_if_cancelled(const CancelFlag& cancel) {
     }
 }
 
-void throw_if_failed(RTCError error) {
+void throw_if_failed(const EmbreeDevice& device, RTCError error) {
     switch (error) {
         case RTC_ERROR_NONE:
             return;
         case RTC_ERROR_OUT_OF_MEMORY:
             throw std::bad_alloc();
         case RTC_ERROR_CANCELLED:
+            if (device.full.load(std::memory_order_relaxed)) {
+                throw std::bad_alloc();
+            }
             throw Cancelled();
         default:
             throw std::runtime_error("Embree error " + std::to_string(error));
@@ -151,7 +176,7 @@ void commit_scene(const BuildTarget& target, std::size_t primitives, const Cance
         }
     }
     throw_if_cancelled(cancel);
-    throw_if_failed(commit->error);
+    throw_if_failed(*target.device, commit->error);
 }
 
 }  // namespace pharos

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 
 #include <embree3/rtcore.h>
@@ -30,14 +31,20 @@ using ScenePtr = std::unique_ptr<RTCSceneTy, SceneRelease>;
 using GeometryPtr = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
 
 // A device and what its callbacks see while it builds, on any of Embree's threads. Once a build was
-// cancelled the device builds nothing more. Throws std::runtime_error without Embree 3.
+// cancelled, or took more than it may, the device builds nothing more. Throws std::runtime_error
+// without Embree 3.
 struct EmbreeDevice {
     EmbreeDevice();
     EmbreeDevice(const EmbreeDevice&) = delete;
     EmbreeDevice& operator=(const EmbreeDevice&) = delete;
 
+    // The device may take so many bytes more than it has.
+    void allow(std::uint64_t more);
+
     std::atomic<bool> stop{false};
+    std::atomic<bool> full{false};
     std::atomic<std::int64_t> bytes{0};
+    std::atomic<std::int64_t> most_bytes{std::numeric_limits<std::int64_t>::max()};
     DevicePtr device;  // last: its end is still counted
 };
 
@@ -45,8 +52,8 @@ struct EmbreeDevice {
 
 void throw_if_cancelled(const CancelFlag& cancel);
 
-// Throws what an error of Embree means to a build.
-void throw_if_failed(RTCError error);
+// Throws what an error of Embree means to a build: std::bad_alloc where the memory was refused.
+void throw_if_failed(const EmbreeDevice& device, RTCError error);
 
 // What is built, and what has to stay alive until the build has ended.
 struct BuildTarget {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <memory>
 #include <new>
+#include <optional>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -184,23 +185,57 @@ template <class Function>
 
 constexpr const char* kUnknownFormat = "The file is not an image of a known format";
 
+struct OpenedFile {
+    std::ifstream stream;  // behind the header
+    std::uint64_t bytes = 0;
+    std::vector<std::uint8_t> header;
+};
+
+// Nothing for what is no regular file: to open a pipe is to wait for whoever writes to it.
+[[nodiscard]] std::optional<OpenedFile> open_regular(const std::string& path) {
+    std::error_code code;
+    OpenedFile file;
+    file.bytes = std::filesystem::file_size(path, code);
+    if (code) {
+        return std::nullopt;
+    }
+    file.stream.open(path, std::ios::binary);
+    if (!file.stream) {
+        return std::nullopt;
+    }
+    file.header.resize(std::min<std::uint64_t>(file.bytes, detail::kImageHeaderBytes));
+    file.stream.read(reinterpret_cast<char*>(file.header.data()),
+                     static_cast<std::streamsize>(file.header.size()));
+    file.header.resize(static_cast<std::size_t>(file.stream.gcount()));
+    return file;
+}
+
 }  // namespace
 
 DecodedImage read_image_file(const std::string& path, const CancelFlag* cancel) {
     return guarded([&]() -> DecodedImage {
-        std::error_code code;
-        const std::uint64_t bytes = std::filesystem::file_size(path, code);
-        std::ifstream file(path, std::ios::binary);
-        if (code || !file) {
+        const std::optional<OpenedFile> file = open_regular(path);
+        if (!file) {
             return failed("The file " + path + " cannot be opened");
         }
-        std::array<std::uint8_t, detail::kImageHeaderBytes> header{};
-        file.read(reinterpret_cast<char*>(header.data()), header.size());
-        const auto got = static_cast<std::size_t>(file.gcount());
-        const char* format = detail::identify_image(std::span(header).first(got));
+        const char* format = detail::identify_image(file->header);
         return format == nullptr ? failed(kUnknownFormat)
-                                 : decode(format, path, nullptr, bytes, cancel);
+                                 : decode(format, path, nullptr, file->bytes, cancel);
     });
+}
+
+std::vector<std::uint8_t> image_file_bytes(const std::string& path) {
+    std::optional<OpenedFile> file = open_regular(path);
+    if (!file || detail::identify_image(file->header) == nullptr) {
+        return {};
+    }
+    std::vector<std::uint8_t> bytes = std::move(file->header);
+    const std::size_t read = bytes.size();
+    bytes.resize(file->bytes);
+    file->stream.read(reinterpret_cast<char*>(bytes.data() + read),
+                      static_cast<std::streamsize>(bytes.size() - read));
+    bytes.resize(read + static_cast<std::size_t>(file->stream.gcount()));
+    return bytes;
 }
 
 ExrFile read_exr(const std::string& path, bool with_pixels) {
@@ -269,6 +304,7 @@ namespace {
                                        OIIO::TypeDesc type,
                                        const void* data) {
     const std::string part = path + ".part";
+    std::remove(part.c_str());  // a link there would lead out of the folder
     const auto fail = [&](const std::string& reason) {
         std::remove(part.c_str());
         return "The file " + path + " cannot be written" + (reason.empty() ? "" : ": " + reason);

@@ -35,6 +35,9 @@ struct DecodedImage {
 [[nodiscard]] DecodedImage read_image_bytes(std::span<const std::uint8_t> bytes,
                                             const CancelFlag* cancel = nullptr);
 
+// The file as it is, for keeping it elsewhere; empty for whatever is no image of a known format.
+[[nodiscard]] std::vector<std::uint8_t> image_file_bytes(const std::string& path);
+
 // From whichever of path, bytes and pixels the description has. Failures are reported under the
 // image's name and give magenta.
 [[nodiscard]] Texture load_texture(const ImageDescription& description,

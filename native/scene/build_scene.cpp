@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "core/fp_state.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "film/passes.h"
 #include "image/image_io.h"
@@ -59,7 +60,8 @@ class SceneBuild {
             std::make_unique<Accelerator>(scene_->description.meshes,
                                           scene_->instances,
                                           cancel_,
-                                          pieces_ != nullptr ? &pieces_->trees() : nullptr);
+                                          pieces_ != nullptr ? &pieces_->trees() : nullptr,
+                                          available_memory());
         scene_->bounds = scene_->accelerator->bounds();
         if (scene_->bounds.empty()) {
             scene_->bounds.extend(Vec3(-1.0f));

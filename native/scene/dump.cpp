@@ -9,6 +9,7 @@
 
 #include "core/atomic_file.h"
 #include "core/checksum.h"
+#include "image/image_io.h"
 #include "scene/dump_fields.h"
 
 namespace pharos {
@@ -80,12 +81,7 @@ const ImageDescription& dump::Writer::self_contained(const ImageDescription& ima
         return image;
     }
     copy = image;
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(image.path, error);
-    std::ifstream file(image.path, std::ios::binary);
-    if (!error && file) {
-        copy.bytes = read_bytes(file, static_cast<std::size_t>(size));
-    }
+    copy.bytes = image_file_bytes(image.path);
     if (!copy.bytes.empty()) {
         copy.path.clear();
     }

@@ -53,8 +53,8 @@ class Writer {
         (put(values), ...);
     }
 
-    // The image with its file's bytes in place of the path, if need be in `copy`. An unreadable
-    // file stays a path, and so a missing image.
+    // The image with its file's bytes in place of the path, if need be in `copy`. A file
+    // that cannot be read, or is no image, stays a path, and so a missing image.
     static const ImageDescription& self_contained(const ImageDescription& image,
                                                   ImageDescription& copy);
 

@@ -12,6 +12,7 @@
 
 #include "core/cancel.h"
 #include "core/fp_state.h"
+#include "core/memory.h"
 #include "scene/compare.h"
 #include "session/coarse_view.h"
 #include "session/guide_controller.h"
@@ -134,10 +135,8 @@ void LiveSession::Impl::take_up(Requests now) {
         progress.lost_scene = false;
     } catch (const Cancelled&) {
         return;  // closing
-    } catch (const std::bad_alloc&) {
-        fail("Out of memory: the scene does not fit.");
     } catch (const std::exception& error) {
-        fail(error.what());
+        fail(is_out_of_memory(error) ? "Out of memory: the scene does not fit." : error.what());
     }
 }
 

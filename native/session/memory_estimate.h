@@ -12,7 +12,4 @@ namespace pharos {
 // what their files hold at least). Lower than the truth rather than higher.
 [[nodiscard]] std::uint64_t estimate_memory(const SceneDescription& description);
 
-// Bytes that this process may still take: by its own limit and by what the machine has free.
-[[nodiscard]] std::uint64_t available_memory();
-
 }  // namespace pharos

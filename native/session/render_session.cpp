@@ -15,6 +15,7 @@
 #include "core/cancel.h"
 #include "core/checksum.h"
 #include "core/fp_state.h"
+#include "core/memory.h"
 #include "integrator/integrator.h"
 #include "scene/scene.h"
 #include "scene/scene_hash.h"
@@ -216,10 +217,8 @@ void RenderSession::Impl::run(SceneDescription description) {
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
     } catch (const Cancelled&) {
         end(SessionState::Cancelled, {});
-    } catch (const std::bad_alloc&) {
-        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
-        end(SessionState::Failed, error.what());
+        end(SessionState::Failed, is_out_of_memory(error) ? kOutOfMemory : error.what());
     }
 }
 
@@ -233,10 +232,8 @@ void RenderSession::Impl::run_built(const BuiltScene& built) {
         }
         render(built.scene, RenderIdentity{}, &built);
         end(cancel.cancelled() ? SessionState::Cancelled : SessionState::Finished, {});
-    } catch (const std::bad_alloc&) {
-        end(SessionState::Failed, kOutOfMemory);
     } catch (const std::exception& error) {
-        end(SessionState::Failed, error.what());
+        end(SessionState::Failed, is_out_of_memory(error) ? kOutOfMemory : error.what());
     }
 }
 

@@ -51,7 +51,7 @@ def blender_start(script: Path) -> list[str]:
         f"exec(compile(open({str(script)!r}).read(), {str(script)!r}, 'exec'), "
         f"{{'__name__': '__main__', '__file__': {str(script)!r}}})"
     )
-    return ["--factory-startup", "--python-exit-code", "3", "--python-expr", expression]
+    return ["--factory-startup", "-Y", "--python-exit-code", "3", "--python-expr", expression]
 
 
 def command(host: str, script: Path, env: dict[str, str]) -> list[str] | None:

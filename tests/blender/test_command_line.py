@@ -42,6 +42,7 @@ def make_scene(name: str, samples: int, kind: str = "plain") -> Path:
             BLENDER,
             "-b",
             "--factory-startup",
+            "-Y",
             "--python-exit-code",
             "3",
             "--python",
@@ -60,9 +61,13 @@ def make_scene(name: str, samples: int, kind: str = "plain") -> Path:
 
 def start(scene: Path, *arguments: str, **variables: str) -> subprocess.Popen:
     env = {**os.environ, "PHAROS_PROGRESS": "1", **variables}
-    command = [BLENDER, "-b", "--factory-startup", "--addons", "pharos", str(scene), *arguments]
+    command = [BLENDER, "-b", "--factory-startup", "-Y", "--addons", "pharos"]
     return subprocess.Popen(
-        command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        [*command, str(scene), *arguments],
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     )
 
 

@@ -1,10 +1,9 @@
 // A dump file of any contents, its checksum made to fit: read, built, and a sample rendered.
-#include <algorithm>
 #include <cstring>
 
 #include "core/checksum.h"
+#include "render_tiny.h"
 #include "scene/dump.h"
-#include "session/render_session.h"
 #include "support/test_scenes.h"
 
 namespace {
@@ -20,23 +19,6 @@ void make_sound(std::vector<std::uint8_t>& bytes) {
     const std::uint64_t sum = pharos::fnv1a(payload);
     std::memcpy(&bytes[kPayloadSize], &size, sizeof(size));
     std::memcpy(&bytes[kChecksum], &sum, sizeof(sum));
-}
-
-void render(pharos::SceneDescription description) {
-    // Small enough to be quick; paths of files belong to the tests of images.
-    pharos::FilmDescription& film = description.film;
-    film.crop_width = std::min(film.crop_width, 4u);
-    film.crop_height = std::min(film.crop_height, 4u);
-    description.settings.samples = std::min(description.settings.samples, 2u);
-    for (pharos::ImageDescription& image : description.images) {
-        image.path.clear();
-    }
-    pharos::RenderSession session(std::move(description), 1);
-    if (!session.wait(std::chrono::milliseconds(2000))) {
-        session.cancel();
-    }
-    while (!session.wait(std::chrono::milliseconds(1000))) {
-    }
 }
 
 }  // namespace
@@ -56,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     make_sound(bytes);
     try {
-        render(pharos::dump_from_bytes(bytes));
+        pharos::fuzzing::render_tiny(pharos::dump_from_bytes(bytes));
     } catch (const std::runtime_error&) {
         return 0;
     }

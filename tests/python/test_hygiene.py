@@ -84,6 +84,57 @@ def test_addon_does_not_print():
     assert not calls, calls
 
 
+_RUNS_CODE = {"eval", "exec", "compile", "__import__", "execfile", "system", "popen"}
+_LOADS_CODE = {"pickle", "marshal", "shelve", "dill", "runpy", "code"}
+
+
+def calls_and_imports(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            function = node.func
+            yield node, getattr(function, "id", getattr(function, "attr", ""))
+        elif isinstance(node, ast.Import):
+            yield from ((node, alias.name.split(".")[0]) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node, (node.module or "").split(".")[0]
+
+
+def test_addon_runs_nothing_that_a_file_says():
+    """No text becomes code, nothing is unpickled, no words go to a shell."""
+    found = []
+    for name, text in texts():
+        if not (name.startswith("addon/") and name.endswith(".py")):
+            continue
+        for node, word in calls_and_imports(ast.parse(text)):
+            shell = any(k.arg == "shell" for k in getattr(node, "keywords", ()))
+            if shell or word in _LOADS_CODE or (
+                    word in _RUNS_CODE and not is_regular_expression(node)):
+                found.append(f"{name}:{node.lineno}: {word}")
+    assert not found, found
+
+
+def is_regular_expression(node):
+    """re.compile()."""
+    owner = getattr(getattr(node, "func", None), "value", None)
+    return getattr(owner, "id", "") == "re"
+
+
+def test_scripts_in_files_stay_off():
+    """Wherever a Blender is started, auto-run is switched off in so many letters."""
+    loose, seen = [], 0
+    for name, text in texts():
+        # The one place that shows what else would happen.
+        text = text.replace('"$BLENDER" -b --factory-startup -y --addons', "")
+        if name.endswith(".md") or name == "tests/python/test_hygiene.py":
+            continue
+        for found in re.finditer(r"--factory-startup", text):
+            seen += 1
+            if not re.match(r"""\W{1,20}(-Y|"-y" if trusted else "-Y")""", text[found.end():][:60]):
+                loose.append(f"{name}: {text[found.start():][:60]!r}")
+    assert seen >= 10
+    assert not loose, loose
+
+
 def test_no_fast_math():
     flags = [name for name, text in texts()
              if name.endswith(("CMakeLists.txt", ".cmake", "CMakePresets.json"))

@@ -89,9 +89,9 @@ class Comparison:
         }
         path = folder / "JOB.json"
         path.write_text(json.dumps(job), encoding="utf-8")
-        command = [self._blender, "-b", "--factory-startup"]
-        if bpy.context.preferences.filepaths.use_scripts_auto_execute:
-            command.append("-y")  # drivers run where they run in this Blender
+        trusted = bpy.context.preferences.filepaths.use_scripts_auto_execute
+        # Drivers run where they run in this Blender.
+        command = [self._blender, "-b", "--factory-startup", "-y" if trusted else "-Y"]
         command += ["--python-exit-code", "3", str(self._copy), "-P", str(WORKER), "--", str(path)]
         with (folder / "said.txt").open("wb") as said:
             self._child = subprocess.Popen(

@@ -14,6 +14,7 @@ class Entry(NamedTuple):
     kind: str = ""  # what `object` names, as in KINDS; empty where only the name is known
     tree: str = ""  # of the node, where it is in a group's tree
     node: str = ""
+    missing: bool = False  # a file that the scene needs is not there or cannot be used
 
 
 class Report:
@@ -22,9 +23,12 @@ class Report:
     def __init__(self):
         self._entries: dict[Entry, None] = {}
 
-    def add(self, severity: str, name: str, message: str, *place: str) -> None:
+    def add(
+        self, severity: str, name: str, message: str, *place: str, missing: bool = False
+    ) -> None:
         """`place`: kind, tree and node, as far as they are known."""
-        self._entries[Entry(severity, name, message, *place)] = None
+        entry = Entry(severity, name, message, *place)._replace(missing=missing)
+        self._entries[entry] = None
 
     def warn(self, name: str, message: str, *place: str) -> None:
         self.add("WARNING", name, message, *place)
@@ -35,7 +39,7 @@ class Report:
     def add_native(self, entries) -> None:
         """Entries of a render session."""
         for entry in entries:
-            self.add(entry.severity.name.upper(), entry.object, entry.message)
+            self.add(entry.severity.name.upper(), entry.object, entry.message, missing=entry.missing)
 
     @property
     def entries(self) -> list[Entry]:

@@ -76,7 +76,8 @@ def render_old_cycles(scene, options, runs, threads, program=None):
     blender = program or os.environ.get("BLENDER") or shutil.which("blender")
     if not blender:
         raise EngineError("there is no blender on the path")
-    command = [blender, "-b", "--factory-startup", "--python-exit-code", "3", "-P", WORKER, "--"]
+    command = [blender, "-b", "--factory-startup", "-Y", "--python-exit-code", "3", "-P", WORKER,
+               "--"]
     return _cycles(command, scene, options, runs, threads)
 
 

@@ -1,13 +1,19 @@
 #include "core/parallel.h"
 
 #include <atomic>
+#include <cstdint>
+#include <fstream>
 #include <set>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 #include <xmmintrin.h>
 
 #include "core/fp_state.h"
+#include "core/memory.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -54,6 +60,29 @@ TEST(ThreadPool, RethrowsAWorkersException) {
         pool.run([&](unsigned) { ++ran; });  // the pool is whole afterwards
         EXPECT_EQ(ran.load(), 4);
     }
+}
+
+// A pool that gets some of its threads and no more ends those and says so.
+TEST(ThreadPool, EndsWhereThereIsNoMemoryForItsThreads) {
+    if (testing::kSlowdown > 1.0) {
+        GTEST_SKIP() << "a sanitizer needs the address space";
+    }
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_AS, &before), 0);
+    std::uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    rlimit low = before;
+    low.rlim_cur = pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) + (64u << 20);
+    ASSERT_EQ(::setrlimit(RLIMIT_AS, &low), 0);
+    bool out_of_memory = false;
+    try {
+        const ThreadPool pool(64);
+    } catch (const std::exception& error) {
+        out_of_memory = is_out_of_memory(error);
+    }
+    ASSERT_EQ(::setrlimit(RLIMIT_AS, &before), 0);
+    EXPECT_TRUE(out_of_memory);
+    EXPECT_EQ(ThreadPool(8).size(), 8u);
 }
 
 TEST(FloatStateGuard, RestoresTheHostsMode) {

@@ -1,6 +1,7 @@
 #include "geometry/accelerator.h"
 
 #include <chrono>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <thread>
@@ -8,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <xmmintrin.h>
 
+#include "geometry/mesh_trees.h"
 #include "random_scene.h"
 #include "support/description_builders.h"
 #include "support/timing.h"
@@ -306,6 +308,47 @@ TEST(Accelerator, ManyBuildsGiveTheMemoryBack) {
         ASSERT_EQ(scene.trace(ray).t, t.value_or(scene.trace(ray).t));
         t = scene.trace(ray).t;
     }
+}
+
+// Embree's own count of its memory is the cap, wherever in a build it is reached.
+TEST(Accelerator, TakesNoMoreThanItMay) {
+    Random random(9);
+    TestGeometry scene;
+    scene.meshes.push_back(random_triangles(random, 200000, 10.0f, 0.1f));
+    for (std::size_t uses = 1; uses <= 2; ++uses) {
+        scene.instances.push_back(make_instance(0, random.affine(1.0f)));
+        const auto build = [&](std::uint64_t most) {
+            const Accelerator built(scene.meshes, scene.instances, CancelFlag(), nullptr, most);
+            return built.bytes();
+        };
+        const std::uint64_t bytes = build(std::uint64_t{1} << 40);
+        const Stopwatch watch;
+        for (const std::uint64_t most : {std::uint64_t{0}, std::uint64_t{1} << 20, bytes / 2}) {
+            EXPECT_THROW(static_cast<void>(build(most)), std::bad_alloc) << most << " of " << bytes;
+        }
+        EXPECT_LT(watch.seconds(), 5.0 * kSlowdown);
+        EXPECT_EQ(build(8 * bytes), bytes);
+    }
+}
+
+// What is kept from before counts no more: only what a build adds.
+TEST(Accelerator, KeptTreesAreWithinTheCap) {
+    Random random(10);
+    TestGeometry scene;
+    for (std::uint64_t i = 0; i < 2; ++i) {
+        scene.meshes.push_back(random_triangles(random, 50000, 10.0f, 0.1f));
+        scene.meshes.back().version = i + 1;
+    }
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    MeshTrees kept;
+    const auto build = [&](std::uint64_t most) {
+        const Accelerator built(scene.meshes, scene.instances, CancelFlag(), &kept, most);
+        return built.bytes();
+    };
+    const std::uint64_t bytes = build(std::uint64_t{1} << 40);
+    EXPECT_LE(build(bytes / 8), bytes);
+    scene.instances.push_back(make_instance(1, Mat4(1.0f)));
+    EXPECT_THROW(static_cast<void>(build(bytes / 8)), std::bad_alloc);
 }
 
 TEST(Accelerator, RefusesAnInstanceOfNoMesh) {

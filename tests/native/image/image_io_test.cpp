@@ -9,6 +9,7 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "core/color.h"
 
@@ -222,6 +223,22 @@ TEST_F(ImageIo, UnwritablePathsGiveASentence) {
     EXPECT_TRUE(fs::is_empty(folder_));
 }
 
+// Links that wait where a picture is written are replaced, not followed.
+TEST_F(ImageIo, WritingStaysInTheFolder) {
+    const std::vector<float> grey(4, 0.5f);
+    const ExrPass pass{"", "Y", grey};
+    const std::string outside = file("outside");
+    write_bytes(outside, std::vector<std::uint8_t>{1, 2, 3});
+    for (const char* name : {"a.exr", "a.exr.part", "b.png", "b.png.part"}) {
+        fs::create_symlink(outside, file(name));
+    }
+    EXPECT_EQ(write_exr(file("a.exr"), 2, 2, {&pass, 1}), "");
+    EXPECT_EQ(write_png(file("b.png"), 2, 2, grey), "");
+    EXPECT_EQ(bytes_of(outside), (std::vector<std::uint8_t>{1, 2, 3}));
+    EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(file("a.exr"))));
+    EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(file("b.png"))));
+}
+
 // A broken file gives a report or whatever could be decoded, never a crash.
 void expect_survives(const std::vector<std::uint8_t>& bytes, const std::string& path) {
     const DecodedImage packed = read_image_bytes(bytes);
@@ -295,6 +312,26 @@ TEST_F(ImageIo, FilesThatAreNoImagesAreRefused) {
     EXPECT_NE(
         read_image_bytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}).error,
         "");
+}
+
+// What is no regular file is not even opened: a pipe would be waited for, a device never ends.
+TEST_F(ImageIo, PipesDevicesAndFoldersAreRefusedAtOnce) {
+    const std::string pipe = file("pipe.png");
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    for (const std::string& path : {pipe, folder_.string(), std::string("/dev/zero")}) {
+        EXPECT_NE(read_image_file(path).error, "") << path;
+        EXPECT_TRUE(image_file_bytes(path).empty()) << path;
+    }
+}
+
+TEST_F(ImageIo, BytesAreThoseOfImagesOnly) {
+    const std::vector<std::uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 1, 2, 3};
+    write_bytes(file("picture"), png);
+    EXPECT_EQ(image_file_bytes(file("picture")), png);
+    const std::vector<std::uint8_t> text = {'t', 'e', 'x', 't'};
+    write_bytes(file("text.png"), text);
+    EXPECT_TRUE(image_file_bytes(file("text.png")).empty());
+    EXPECT_TRUE(image_file_bytes(file("missing")).empty());
 }
 
 void append_big_endian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {

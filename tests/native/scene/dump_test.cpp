@@ -200,8 +200,9 @@ TEST(Dump, EmptyDescription) {
 
 TEST(Dump, FilesHoldTheImagesTheyRefer) {
     const TemporaryDirectory directory;
+    const std::string picture = "\x89PNG\r\n\x1a\n and so on";
     const std::string image = directory.file("image.png");
-    std::ofstream(image, std::ios::binary) << "not a picture";
+    std::ofstream(image, std::ios::binary) << picture;
     SceneDescription description = full_description();
     description.images.resize(3);
     description.images[1].path = image;
@@ -211,10 +212,24 @@ TEST(Dump, FilesHoldTheImagesTheyRefer) {
     std::filesystem::remove(image);
     const SceneDescription back = read_dump(path);
     const std::vector<std::uint8_t>& bytes = back.images.at(1).bytes;
-    EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "not a picture");
+    EXPECT_EQ(std::string(bytes.begin(), bytes.end()), picture);
     EXPECT_TRUE(back.images.at(1).path.empty());
     EXPECT_TRUE(back.images.at(2).bytes.empty());
     EXPECT_EQ(back.images.at(2).path, directory.file("missing.png"));
+}
+
+// A scene may name any file of its reader's: nothing but pictures gets into a dump.
+TEST(Dump, FilesThatAreNoImagesStayOutside) {
+    const TemporaryDirectory directory;
+    const std::string secret = "a key that belongs to nobody else";
+    const std::string name = directory.file("secret.png");
+    std::ofstream(name, std::ios::binary) << secret;
+    SceneDescription description;
+    description.images.resize(1);
+    description.images[0].path = name;
+    const std::vector<std::uint8_t> bytes = dump_to_bytes(description);
+    EXPECT_EQ(std::string(bytes.begin(), bytes.end()).find(secret), std::string::npos);
+    EXPECT_EQ(dump_from_bytes(bytes).images.at(0).path, name);
 }
 
 TEST(Dump, WritingReplacesAndLeavesNothingBehind) {

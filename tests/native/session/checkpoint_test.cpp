@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +13,7 @@
 #include "support/scratch.h"
 #include "support/stress.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -20,6 +22,7 @@ using namespace pharos::testing;
 
 constexpr std::uint32_t kSize = 40;
 constexpr std::uint32_t kSamples = 40;
+constexpr std::uint64_t kStride = kSlowdown > 1.0 ? 14 : 7;  // batches between two cuts
 
 SceneDescription scene(GuidingMode guiding) {
     SceneDescription d = two_rooms(kSize, kSize - 9, kSamples);
@@ -58,7 +61,7 @@ bool render_a_part(const SceneDescription& d,
                    const SessionOptions& options,
                    std::uint64_t batches) {
     RenderSession session(d, options);
-    while (!session.wait(std::chrono::milliseconds(0))) {
+    while (!session.wait(std::chrono::milliseconds(1))) {
         if (session.progress().serial >= batches) {
             session.cancel();
         }
@@ -88,7 +91,7 @@ TEST(Checkpoint, ResumedRenderIsBitEqual) {
         const ScratchFolder folder;
         const SessionOptions options = with_file(folder.file("checkpoint"));
         int parts = 0;
-        for (std::uint64_t batches = 3; !render_a_part(d, options, batches); batches += 7) {
+        for (std::uint64_t batches = 3; !render_a_part(d, options, batches); batches += kStride) {
             ASSERT_LT(++parts, 500);
         }
         EXPECT_GT(parts, 3);
@@ -191,6 +194,70 @@ TEST(Checkpoint, AFolderThatIsNotThereDoesNotEndTheRender) {
     EXPECT_EQ(session.report().back().object, "Checkpoint");
 }
 
+// What the process that is killed does: PHAROS_KEEP_CHECKPOINT names the file, and it never ends.
+SceneDescription endless() {
+    SceneDescription d = scene(GuidingMode::Neural);
+    d.settings.samples = 1u << 20;
+    return d;
+}
+
+SessionOptions always_written(const std::string& path) {
+    SessionOptions options = with_file(path);
+    options.checkpoint.interval = 0.0;
+    options.threads = 1;
+    return options;
+}
+
+TEST(Scripts, KeepACheckpointUntilKilled) {
+    const char* path = std::getenv("PHAROS_KEEP_CHECKPOINT");
+    const ScratchFolder folder;
+    SceneDescription d = endless();
+    if (path == nullptr) {
+        d.settings.samples = 2;
+    }
+    const SessionOptions options = always_written(path != nullptr ? path : folder.file("file"));
+    RenderSession session(std::move(d), options);
+    if (path != nullptr) {
+        std::ofstream(std::string(path) + ".started");
+    }
+    wait(session);
+    EXPECT_EQ(session.progress().state, SessionState::Finished) << session.progress().error;
+    EXPECT_TRUE(std::filesystem::exists(options.checkpoint.path));
+}
+
+// This program again, with another test: a forked process could not start threads under the thread
+// sanitizer.
+pid_t start_keeping(const std::string& path) {
+    std::vector<std::string> variables = {"PHAROS_KEEP_CHECKPOINT=" + path};
+    for (char** variable = environ; *variable != nullptr; ++variable) {
+        variables.emplace_back(*variable);
+    }
+    std::vector<char*> environment;
+    for (std::string& variable : variables) {
+        environment.push_back(variable.data());
+    }
+    environment.push_back(nullptr);
+    std::string program = "/proc/self/exe";
+    std::string filter = "--gtest_filter=Scripts.KeepACheckpointUntilKilled";
+    std::string brief = "--gtest_brief=1";
+    char* const arguments[] = {program.data(), filter.data(), brief.data(), nullptr};
+    pid_t child = -1;
+    EXPECT_EQ(
+        ::posix_spawn(&child, program.c_str(), nullptr, nullptr, arguments, environment.data()), 0);
+    return child;
+}
+
+// Waits until the file is there; false where the process has ended before.
+bool appears(const std::string& file, pid_t writer) {
+    while (!std::filesystem::exists(file)) {
+        if (::waitpid(writer, nullptr, WNOHANG) != 0) {
+            return false;
+        }
+        ::usleep(1000);
+    }
+    return true;
+}
+
 // A process of its own renders and writes without pause until it is killed: PHAROS_KILLS times,
 // 100 in tests/stress. The file has to be whole each time, and the render has to end with the bits
 // of an uninterrupted one.
@@ -198,31 +265,22 @@ TEST(Checkpoint, SurvivesKillsAtRandomMoments) {
     const char* wanted = std::getenv("PHAROS_KILLS");
     const int kills = wanted != nullptr ? std::atoi(wanted) : 5;
     const ScratchFolder folder;
-    SessionOptions options = with_file(folder.file("checkpoint"));
-    options.checkpoint.interval = 0.0;
-    options.threads = 1;
-    SceneDescription d = scene(GuidingMode::Neural);
-    d.settings.samples = 1u << 20;
+    const SessionOptions options = always_written(folder.file("checkpoint"));
+    const std::string started = options.checkpoint.path + ".started";
+    SceneDescription d = endless();
     std::uint32_t random = 12345;
     std::uint32_t samples = 0;
-    for (int i = 0; i < kills; ++i) {
-        const pid_t child = ::fork();
-        ASSERT_GE(child, 0);
-        if (child == 0) {
-            RenderSession session(d, options);
-            wait(session);
-            // It must not come to its end: the parent looks at how it ended.
-            ::_exit(session.progress().state == SessionState::Failed ? 1 : 0);
-        }
-        while (i == 0 && !std::filesystem::exists(options.checkpoint.path)) {
-            ::usleep(1000);
-        }
+    // A machine that is slow enough kills before there are two samples: once more then.
+    for (int i = 0; i < kills || (samples < 2 && i < 20 * kills); ++i) {
+        const pid_t child = start_keeping(options.checkpoint.path);
+        ASSERT_TRUE(appears(started, child) && (i > 0 || appears(options.checkpoint.path, child)));
         random = random * 1664525u + 1013904223u;
-        ::usleep(30000 + random % 170000);
+        ::usleep(static_cast<useconds_t>(kSlowdown) * (random % 200000));
         ::kill(child, SIGKILL);
         int status = 0;
         ASSERT_EQ(::waitpid(child, &status, 0), child);
         ASSERT_TRUE(WIFSIGNALED(status)) << "kill " << i << ": the file was refused";
+        std::filesystem::remove(started);
         SceneDescription nothing_more = d;
         nothing_more.settings.samples = 1;
         RenderSession session(nothing_more, options);

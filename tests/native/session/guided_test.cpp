@@ -9,6 +9,7 @@
 #include "session/guide_controller.h"
 #include "support/render.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -92,7 +93,8 @@ TEST(Guided, IsBitEqualForAnyNumberOfThreads) {
                                    GuidingMode::Slides,
                                    GuidingMode::SlidesPosition,
                                    GuidingMode::SlidesMixture}) {
-        SceneDescription description = two_rooms(61, 47, 24);
+        SceneDescription description =
+            kSlowdown > 1.0 ? two_rooms(31, 23, 16) : two_rooms(61, 47, 24);
         description.settings.guiding = mode;
         const Rendered one = render(description, 1);
         ASSERT_EQ(one.progress.state, SessionState::Finished);

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/memory.h"
 #include "scene/dump.h"
 #include "session/memory_estimate.h"
 #include "support/random.h"

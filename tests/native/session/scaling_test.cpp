@@ -7,6 +7,7 @@
 #include "support/render.h"
 #include "support/stress.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -26,7 +27,8 @@ SceneDescription scene(GuidingMode guiding, float scale) {
     builder.object(box_mesh("ember", Vec3(0.5f, -0.8f, 0.2f), Vec3(0.8f, -0.5f, 0.5f)), ember);
     builder.lamp(area_lamp(
         look_at(Vec3(-1.2f, 1.3f, 2.4f), Vec3(-1.2f, 1.3f, 0)), Rgb(1e8f * scale), 0.5f, 0.5f));
-    builder.camera(Vec3(0, -1.9f, 1.2f), Vec3(0, 0, 1), 1.0f, 40, 30);
+    const std::uint32_t side = kSlowdown > 1.0 ? 12 : 40;
+    builder.camera(Vec3(0, -1.9f, 1.2f), Vec3(0, 0, 1), 1.0f, side, side * 3 / 4);
     SceneDescription description = builder.build();
     description.settings.samples = 24;
     description.settings.guiding = guiding;

@@ -62,9 +62,11 @@ struct Agreement {
     double picture_t = 0.0;   // of the whole picture's means
 };
 
-Agreement compare(const SceneDescription& description, std::uint32_t seeds) {
+Agreement compare(const SceneDescription& description,
+                  std::uint32_t seeds,
+                  GuidingMode mode = GuidingMode::Neural) {
     const BlockMoments off = render_seeds(description, GuidingMode::Off, seeds);
-    const BlockMoments guided = render_seeds(description, GuidingMode::Neural, seeds);
+    const BlockMoments guided = render_seeds(description, mode, seeds);
     std::vector<double> p;
     for (std::size_t i = 0; i < off.blocks.size(); ++i) {
         if (off.blocks[i].mean > 0.0 || guided.blocks[i].mean > 0.0) {
@@ -99,6 +101,45 @@ TEST(WelchStatistics, GuidedAndUnguidedHaveOneMean) {
     const Agreement agreement = compare(two_rooms(32, 24, 20), 10);
     EXPECT_GT(agreement.uniformity, 1e-4);
     EXPECT_LT(std::abs(agreement.picture_t), 4.0);
+}
+
+// Two rooms side by side, open towards the camera and nowhere else: light of one never gets into
+// the other. One has a lamp of 1e8, the other an ember of 1e-8.
+SceneDescription huge_and_tiny(std::uint32_t width, std::uint32_t height, std::uint32_t samples) {
+    SceneBuilder builder;
+    const auto white = builder.material("white", diffuse_program(Rgb(0.7f)));
+    const auto gloss = builder.material("gloss", glossy_program(Rgb(0.8f), 0.3f));
+    const auto ember = builder.material("ember", diffuse_emission_program(Rgb(0.5f), Rgb(1e-8f)));
+    const Vec3 wide(4, 0, 0);
+    const Vec3 deep(0, 2, 0);
+    const Vec3 high(0, 0, 2);
+    builder.object(quad_mesh("floor", Vec3(-2, 0, 0), wide, deep), white);
+    builder.object(quad_mesh("ceiling", Vec3(-2, 0, 2), wide, deep), white);
+    builder.object(quad_mesh("back", Vec3(-2, 2, 0), wide, high), white);
+    for (const float x : {-2.0f, 0.0f, 2.0f}) {
+        builder.object(quad_mesh("side", Vec3(x, 0, 0), deep, high), white);
+    }
+    builder.object(sphere_mesh("left", Vec3(-1, 1.2f, 0.4f), 0.4f), gloss);
+    builder.object(sphere_mesh("right", Vec3(1.2f, 1.4f, 0.4f), 0.4f), gloss);
+    builder.object(box_mesh("ember", Vec3(0.3f, 0.8f, 1.0f), Vec3(0.5f, 1.0f, 1.2f)), ember);
+    builder.lamp(area_lamp(look_at(Vec3(-1, 1, 1.9f), Vec3(-1, 1, 0)), Rgb(1e8f), 0.4f, 0.4f));
+    builder.camera(Vec3(0, -4.5f, 1), Vec3(0, 1, 1), 0.8f, width, height);
+    SceneDescription description = builder.build();
+    description.settings.samples = samples;
+    return description;
+}
+
+TEST(WelchStatistics, HugeAndTinyEmissionHaveOneMeanWithAGuide) {
+    for (const GuidingMode mode : {GuidingMode::Neural, GuidingMode::Slides}) {
+        const Agreement agreement = compare(huge_and_tiny(48, 32, 20), 10, mode);
+        EXPECT_GT(agreement.uniformity, 1e-4) << static_cast<int>(mode);
+        EXPECT_LT(std::abs(agreement.picture_t), 4.0) << static_cast<int>(mode);
+    }
+    // The rooms are as far apart as their lights.
+    const BlockMoments blocks = render_seeds(huge_and_tiny(48, 32, 4), GuidingMode::Neural, 2);
+    EXPECT_GT(blocks.blocks[6 + 1].mean, 1e5);
+    EXPECT_GT(blocks.blocks[6 + 4].mean, 0.0);
+    EXPECT_LT(blocks.blocks[6 + 4].mean, 1e-5);
 }
 
 TEST(WelchLongStatistics, ScenesOfTheProject) {
