@@ -136,7 +136,7 @@ def main() -> int:
     env["PHAROS_EXPORT_BENCH"] = "1"
     python = ROOT / "build" / "bpy" / "bin" / "python"
     script = str(Path(__file__).resolve())
-    blender = [env.get("BLENDER", "blender"), "-b", "--factory-startup", "-P", script]
+    blender = [env.get("BLENDER", "blender"), "-b", "--factory-startup", "-Y", "-P", script]
     for command in (blender, [str(python), script]):
         done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
         words = ("Blender ", "1 M", "F12")

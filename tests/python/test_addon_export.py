@@ -256,9 +256,11 @@ def test_report_says_everything_once():
     for _ in range(2):
         report.warn("Cube", "odd")
     report.info("Cube", "odd", "OBJECT")
+    report.add("WARNING", "Photo", "not there", missing=True)
     assert [tuple(entry) for entry in report.entries] == [
-        ("WARNING", "Cube", "odd", "", "", ""),
-        ("INFO", "Cube", "odd", "OBJECT", "", ""),
+        ("WARNING", "Cube", "odd", "", "", "", False),
+        ("INFO", "Cube", "odd", "OBJECT", "", "", False),
+        ("WARNING", "Photo", "not there", "", "", "", True),
     ]
 
 

@@ -39,7 +39,8 @@ class Report:
     def add_native(self, entries) -> None:
         """Entries of a render session."""
         for entry in entries:
-            self.add(entry.severity.name.upper(), entry.object, entry.message, missing=entry.missing)
+            severity = entry.severity.name.upper()
+            self.add(severity, entry.object, entry.message, missing=entry.missing)
 
     @property
     def entries(self) -> list[Entry]:
