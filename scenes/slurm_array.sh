@@ -18,7 +18,7 @@ if [ "${1-}" = --task ]; then
     scene=$1 out=$2 samples=$3 shards=$4 field=$5 i=$SLURM_ARRAY_TASK_ID
     first=$((samples * i / shards)) next=$((samples * (i + 1) / shards))
     guide=(--guiding off)
-    [ -z "$field" ] || guide=(--field "$field")
+    [ -z "$field" ] || guide=(--guiding neural --field "$field")
     exec "$cli" render "$scene" -o "$out.$i.exr" "${guide[@]}" \
         --sample-offset "$first" --sample-count $((next - first)) \
         --threads "${SLURM_CPUS_PER_TASK:-1}" --checkpoint "$out.$i.checkpoint" --resume

@@ -82,10 +82,8 @@ void print(const Adaptation& a) {
 
 int adapt(const std::vector<std::string>& arguments) {
     Options options;
-    options.input = walk_arguments(
-        arguments,
-        [](const std::string&) { return false; },
-        [&](const std::string& name, const std::string& value) {
+    options.input =
+        walk_arguments(arguments, no_flags, [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
     if (options.input.empty() || (!options.size.empty() && options.size.size() != 2)) {

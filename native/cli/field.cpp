@@ -40,10 +40,8 @@ void parse_option(const std::string& name, const std::string& value, Options& op
 
 Options parse(const std::vector<std::string>& arguments) {
     Options options;
-    options.input = walk_arguments(
-        arguments,
-        [](const std::string&) { return false; },
-        [&](const std::string& name, const std::string& value) {
+    options.input =
+        walk_arguments(arguments, no_flags, [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
     if (options.input.empty() || options.output.empty() || options.pixel.size() != 2) {

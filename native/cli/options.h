@@ -54,6 +54,11 @@ struct CommonOptions {
 [[nodiscard]] std::vector<std::byte> read_bytes(const std::string& path);
 void write_bytes(const std::string& path, std::span<const std::byte> bytes);
 
+// The `flag` of a command that has none.
+[[nodiscard]] inline bool no_flags(const std::string& /*name*/) {
+    return false;
+}
+
 // Walks over the arguments: `flag` says whether a word stands alone, `option` takes a name and its
 // value. Returns the one word that is neither, the input file.
 [[nodiscard]] std::string walk_arguments(

@@ -216,16 +216,15 @@ struct ClosureChoice {
 
 }  // namespace
 
-BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi) {
+namespace {
+
+// Sum of the smooth closures that `counts` names.
+template <class Counts>
+[[nodiscard]] BsdfEval eval_closures(const Bsdf& bsdf, const Vec3& wi, const Counts& counts) {
     const bool in_front = glm::dot(wi, bsdf.ng) > 0.0f;
-    if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
-        BsdfEval e = eval_lambert(bsdf.closures[0], wi);
-        e.pdf = in_front ? e.pdf : 0.0f;
-        return e;
-    }
     BsdfEval sum;
     for (const Closure& c : bsdf.closures) {
-        if (is_delta(c)) {
+        if (is_delta(c) || !counts(c)) {
             continue;
         }
         const BsdfEval e = eval_closure(c, bsdf.wo, wi);
@@ -238,29 +237,26 @@ BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi) {
     return sum;
 }
 
+}  // namespace
+
+BsdfEval eval_bsdf(const Bsdf& bsdf, const Vec3& wi) {
+    if (bsdf.closures.size() == 1 && bsdf.closures[0].type == ClosureType::Diffuse) {
+        BsdfEval e = eval_lambert(bsdf.closures[0], wi);
+        e.pdf = glm::dot(wi, bsdf.ng) > 0.0f ? e.pdf : 0.0f;
+        return e;
+    }
+    return eval_closures(bsdf, wi, [](const Closure&) { return true; });
+}
+
 BsdfEval eval_bsdf_seeing(const Bsdf& bsdf, const Vec3& wi, std::uint32_t visibility) {
-    const bool in_front = glm::dot(wi, bsdf.ng) > 0.0f;
-    BsdfEval sum;
-    for (const Closure& c : bsdf.closures) {
-        if (is_delta(c)) {
-            continue;
-        }
+    return eval_closures(bsdf, wi, [&](const Closure& c) {
         // Translucent lobes are diffuse here, as in Cycles.
         const std::uint8_t lobe = lobe_bits(c, glm::dot(c.n, wi) < 0.0f);
         const std::uint32_t kind = lobe & kLobeDiffuse        ? kVisibleDiffuse
                                    : lobe & kLobeTransmission ? kVisibleTransmission
                                                               : kVisibleGlossy;
-        if ((visibility & kind) == 0) {
-            continue;
-        }
-        const BsdfEval e = eval_closure(c, bsdf.wo, wi);
-        sum.f_cos += e.f_cos;
-        if ((glm::dot(c.n, wi) > 0.0f) == in_front) {
-            sum.pdf += c.sample_weight * e.pdf;
-        }
-    }
-    sum.pdf = bsdf.total_sample_weight > 0.0f ? sum.pdf / bsdf.total_sample_weight : 0.0f;
-    return sum;
+        return (visibility & kind) != 0;
+    });
 }
 
 std::optional<BsdfSample> sample_bsdf(const Bsdf& bsdf, float u_closure, const Vec2& u) {
