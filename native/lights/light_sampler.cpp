@@ -14,8 +14,12 @@ namespace {
 
 constexpr float kFaintest = 0.05f;
 
-bool shines(const EnvironmentLight* environment) {
-    return environment != nullptr && average(glm::abs(environment->mean_radiance())) > 0.0f;
+// A constant world has nothing to aim at: scattered rays find it with the cosine in their density,
+// and a second technique would only add its noise (MIS compensation, Karlik et al. 2019, gives it
+// density 0). Portals are something to aim at.
+bool is_worth_sampling(const EnvironmentLight* environment, bool has_portals) {
+    return environment != nullptr && (has_portals || !environment->is_constant()) &&
+           average(glm::abs(environment->mean_radiance())) > 0.0f;
 }
 
 LightBound bound_environment(const EnvironmentLight& environment) {
@@ -114,7 +118,7 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
     for (std::uint32_t group = 0; group < impl_->triangles.group_count(); ++group) {
         bounds.push_back(impl_->triangles.bound(group));
     }
-    if (shines(input.environment)) {
+    if (is_worth_sampling(input.environment, !impl_->portals.empty())) {
         impl_->environment = input.environment;
         bounds.push_back(bound_environment(*input.environment));
     }

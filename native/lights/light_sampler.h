@@ -33,7 +33,8 @@ struct LightSamplerInput {
     std::span<const EmissiveTriangle> triangles;
     std::span<const Mesh> meshes;
     std::span<const Instance> instances;
-    const EnvironmentLight* environment = nullptr;  // null or black: no world light
+    // Null, black, or constant without portals: not sampled.
+    const EnvironmentLight* environment = nullptr;
 };
 
 // A sample on an emissive triangle or the world still needs its radiance from a node program.

@@ -160,28 +160,46 @@ TEST(Environment, MeanRadiance) {
 
 // A white plane under a world of radiance 1 reflects 1.
 TEST(Environment, WhiteWorldThroughTheSampler) {
-    for (const std::uint32_t width : {1u, 32u}) {
-        const EnvironmentLight light = make(flat_map(width, width == 1 ? 1 : 16, 1.0f));
-        const LightSampler sampler =
-            test::make_sampler(std::span<const LightDescription>(), 405, &light);
-        ASSERT_FALSE(sampler.empty());
-        const LightSampleContext context = test::plane_point();
-        Random random(2);
-        double sum = 0.0;
-        constexpr int kSide = 400;
-        for (int i = 0; i < kSide * kSide; ++i) {
-            const int row = i / kSide;
-            const Vec2 cell(static_cast<float>(i % kSide), static_cast<float>(row));
-            const auto s = sampler.sample(context, 0.5f, (cell + random.uniform2()) / float{kSide});
-            ASSERT_TRUE(s && s->environment);
-            EXPECT_EQ(s->sample.distance, kInfinity);
-            sum += static_cast<double>(std::max(s->sample.wi.z, 0.0f) / s->sample.pdf);
-            if (i % 97 == 0) {
-                EXPECT_NEAR(
-                    sampler.pdf_environment(context, s->sample.wi) / s->sample.pdf, 1.0f, 1e-3f);
-            }
+    const EnvironmentLight light = make(flat_map(32, 16, 1.0f));
+    const LightSampler sampler =
+        test::make_sampler(std::span<const LightDescription>(), 405, &light);
+    ASSERT_FALSE(sampler.empty());
+    const LightSampleContext context = test::plane_point();
+    Random random(2);
+    double sum = 0.0;
+    constexpr int kSide = 400;
+    for (int i = 0; i < kSide * kSide; ++i) {
+        const int row = i / kSide;
+        const Vec2 cell(static_cast<float>(i % kSide), static_cast<float>(row));
+        const auto s = sampler.sample(context, 0.5f, (cell + random.uniform2()) / float{kSide});
+        ASSERT_TRUE(s && s->environment);
+        EXPECT_EQ(s->sample.distance, kInfinity);
+        sum += static_cast<double>(std::max(s->sample.wi.z, 0.0f) / s->sample.pdf);
+        if (i % 97 == 0) {
+            EXPECT_NEAR(
+                sampler.pdf_environment(context, s->sample.wi) / s->sample.pdf, 1.0f, 1e-3f);
         }
-        EXPECT_NEAR(sum / kSide / kSide / std::numbers::pi, 1.0, 2e-3);
+    }
+    EXPECT_NEAR(sum / kSide / kSide / std::numbers::pi, 1.0, 2e-3);
+}
+
+// A world of one color leaves all samples to the lamps; its own light comes by scattering alone.
+TEST(Environment, ConstantWorldIsNotSampled) {
+    const EnvironmentLight light = make(flat_map(1, 1, 1.0f));
+    const LightSampleContext context = test::plane_point();
+    const LightSampler alone = test::make_sampler(std::span<const LightDescription>(), 405, &light);
+    EXPECT_TRUE(alone.empty());
+    EXPECT_EQ(alone.pdf_environment(context, Vec3(0.0f, 0.0f, 1.0f)), 0.0f);
+
+    LightDescription lamp;
+    lamp.type = LightType::Point;
+    lamp.to_world[3] = Vec4(0.0f, 0.0f, 2.0f, 1.0f);
+    lamp.strength = Rgb(1.0f);
+    const LightSampler sampler = test::make_sampler(std::span(&lamp, 1), 405, &light);
+    Random random(3);
+    for (int i = 0; i < 1000; ++i) {
+        const auto s = sampler.sample(context, random.uniform(), random.uniform2());
+        ASSERT_TRUE(s && !s->environment);
     }
 }
 

@@ -169,14 +169,12 @@ TEST(Portals, BehindThemAndWithoutAWorld) {
     EXPECT_FALSE(test::make_sampler(portal, 405).has_hittable_lamps());
 }
 
-// A portal without an area opens nothing.
+// A portal without an area opens nothing: a constant world is left to scattering.
 TEST(Portals, EmptyOpenings) {
     const EnvironmentLight world = constant_world();
     LightDescription portal = window(0.0f);
     portal.size_u = 0.0f;
-    const LightSampler sampler = test::make_sampler(std::span(&portal, 1), 405, &world);
-    EXPECT_NEAR(
-        reflected(sampler, test::plane_point(), [](const Vec3&) { return 1.0f; }), 1.0, 5e-3);
+    EXPECT_TRUE(test::make_sampler(std::span(&portal, 1), 405, &world).empty());
 }
 
 }  // namespace
