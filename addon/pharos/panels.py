@@ -438,9 +438,11 @@ def compatible_panels():
             yield panel
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)
+
+
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     for panel in compatible_panels():
         panel.COMPAT_ENGINES.add(_ENGINE)
 
@@ -448,5 +450,4 @@ def register():
 def unregister():
     for panel in compatible_panels():
         panel.COMPAT_ENGINES.discard(_ENGINE)
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

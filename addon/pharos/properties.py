@@ -233,9 +233,11 @@ class PharosViewLayerSettings(bpy.types.PropertyGroup):
 _CLASSES = (PharosReportEntry, PharosSceneSettings, PharosViewLayerSettings)
 
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)
+
+
 def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    _register_classes()
     bpy.types.Scene.pharos = PointerProperty(name="Pharos", type=PharosSceneSettings)
     bpy.types.ViewLayer.pharos = PointerProperty(name="Pharos", type=PharosViewLayerSettings)
 
@@ -243,5 +245,4 @@ def register():
 def unregister():
     del bpy.types.ViewLayer.pharos
     del bpy.types.Scene.pharos
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

@@ -206,12 +206,4 @@ class PHAROS_UL_report(bpy.types.UIList):
 
 _CLASSES = (PHAROS_OT_select_reported, PHAROS_UL_report)
 
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -253,12 +253,4 @@ class PHAROS_RENDER_PT_compare(bpy.types.Panel):
 
 _CLASSES = (PHAROS_OT_compare, PHAROS_RENDER_PT_compare)
 
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)
