@@ -149,8 +149,9 @@ struct Workload {
         constexpr std::size_t kWidth = 256;
         constexpr std::size_t kHeight = kRays / kWidth;
         for (std::size_t i = 0; i < kRays; ++i) {
+            const std::size_t row = i / kWidth;
             const float x = static_cast<float>(i % kWidth) / kWidth - 0.5f;
-            const float y = static_cast<float>(i / kWidth) / kHeight - 0.5f;
+            const float y = static_cast<float>(row) / kHeight - 0.5f;
             rays.push_back({Vec3(0.0f, -2.95f, 0.0f), glm::normalize(Vec3(x, 1.0f, 0.6f * y))});
         }
     }

@@ -62,11 +62,11 @@ struct Shading {
     ShadingScratch scratch;
     ClosureBatch closures;
 
-    explicit Shading(NodeProgram program) {
+    explicit Shading(const NodeProgram& program) {
         SceneReport report;
         textures.push_back(checker_texture());
         context.textures = textures;
-        material = compile_material("bench", std::move(program), report, textures);
+        material = compile_material("bench", program, report, textures);
         evaluate();
     }
 
@@ -187,8 +187,9 @@ std::vector<LightDescription> make_lamps(int count) {
         lamp.size_u = lamp.size_v = 0.5f / static_cast<float>(side);
         lamp.strength = Rgb(100.0f);
         const float step = 4.0f / static_cast<float>(side);
+        const int row = i / side;
         lamp.to_world[3] = Vec4((static_cast<float>(i % side) + 0.5f) * step - 2.0f,
-                                (static_cast<float>(i / side) + 0.5f) * step - 2.0f,
+                                (static_cast<float>(row) + 0.5f) * step - 2.0f,
                                 2.0f,
                                 1.0f);
         lamps.push_back(lamp);

@@ -94,7 +94,7 @@ void bind_codes(py::module_& m) {
     }
 }
 
-void bind_modes(py::module_& m) {
+void bind_outputs(py::module_& m) {
     {
         using E = GeometryOutput;
         m.attr("GeometryOutput") = numbers<E>({{"Position", E::Position},
@@ -141,6 +141,9 @@ void bind_modes(py::module_& m) {
                                                 {"TransparentDepth", E::TransparentDepth},
                                                 {"TransmissionDepth", E::TransmissionDepth}});
     }
+}
+
+void bind_node_modes(py::module_& m) {
     {
         using E = Distribution;
         m.attr("Distribution") = numbers<E>({{"Sharp", E::Sharp},
@@ -270,6 +273,9 @@ void bind_operations(py::module_& m) {
                                                {"Power", E::Power},
                                                {"Sign", E::Sign}});
     }
+}
+
+void bind_texture_modes(py::module_& m) {
     {
         using E = FractalType;
         m.attr("FractalType") = numbers<E>({{"Multifractal", E::Multifractal},
@@ -325,8 +331,10 @@ void bind_operations(py::module_& m) {
 
 void bind_node_enums(py::module_& m) {
     bind_codes(m);
-    bind_modes(m);
+    bind_outputs(m);
+    bind_node_modes(m);
     bind_operations(m);
+    bind_texture_modes(m);
     m.attr("CLAMP_BIT") = static_cast<int>(kClampBit);
     m.attr("CLAMP_FACTOR_BIT") = static_cast<int>(kClampFactorBit);
     m.attr("STEP_BIT") = static_cast<int>(kStepBit);

@@ -26,11 +26,21 @@ void require(bool condition, const std::string& name, const char* what) {
     }
 }
 
+template <class T>
+constexpr std::size_t components_of() {
+    if constexpr (std::is_arithmetic_v<T>) {
+        return 1;
+    } else {
+        return static_cast<std::size_t>(T::length());
+    }
+}
+
 // Rows of `components` scalars as a vector of T, which has that layout. The GIL is not held
 // meanwhile: `array` keeps the memory alive.
 template <class T, class Scalar>
 std::vector<T> copy_rows(const Array<Scalar>& array, const std::string& name, const char* what) {
-    constexpr std::size_t components = sizeof(T) / sizeof(Scalar);
+    constexpr std::size_t components = components_of<T>();
+    static_assert(sizeof(T) == components * sizeof(Scalar));
     const auto size = static_cast<std::size_t>(array.size());
     require(size % components == 0, name, what);
     std::vector<T> out(size / components);
@@ -44,10 +54,12 @@ std::vector<T> copy_rows(const Array<Scalar>& array, const std::string& name, co
 
 template <class Scalar, class T>
 py::array_t<Scalar> to_array(const std::vector<T>& rows) {
-    constexpr std::size_t components = sizeof(T) / sizeof(Scalar);
+    constexpr std::size_t components = components_of<T>();
+    static_assert(sizeof(T) == components * sizeof(Scalar));
     py::array_t<Scalar> out({rows.size(), components});
     if (!rows.empty()) {
-        std::memcpy(out.mutable_data(), rows.data(), rows.size() * sizeof(T));
+        const void* source = rows.data();
+        std::memcpy(out.mutable_data(), source, rows.size() * sizeof(T));
     }
     return out;
 }
@@ -116,9 +128,9 @@ std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArra
 
 // A mesh or image that the receiver of the description knows by its version.
 template <class Thing>
-std::uint32_t add_kept(std::vector<Thing>& things, std::string name, std::uint64_t version) {
+std::uint32_t add_kept(std::vector<Thing>& things, const std::string& name, std::uint64_t version) {
     Thing& kept = things.emplace_back();
-    kept.name = std::move(name);
+    kept.name = name;
     kept.version = version;
     return index_of_last(things.size());
 }
@@ -306,7 +318,7 @@ void bind_views(py::module_& m) {
         .def_readwrite("aovs", &PassesDescription::aovs);
 }
 
-void bind_adders(py::class_<SceneDescription>& scene) {
+void bind_mesh_adders(py::class_<SceneDescription>& scene) {
     scene
         .def(
             "add_mesh",
@@ -343,8 +355,8 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("version") = 0)
         .def(
             "add_kept_mesh",
-            [](SceneDescription& s, std::string name, std::uint64_t version) {
-                return add_kept(s.meshes, std::move(name), version);
+            [](SceneDescription& s, const std::string& name, std::uint64_t version) {
+                return add_kept(s.meshes, name, version);
             },
             FloatGuard(),
             py::arg("name"),
@@ -357,7 +369,11 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             },
             FloatGuard(),
             py::arg("name"),
-            py::arg("values"))
+            py::arg("values"));
+}
+
+void bind_material_adders(py::class_<SceneDescription>& scene) {
+    scene
         .def(
             "add_material",
             [](SceneDescription& s,
@@ -405,6 +421,9 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("meshes"),
             py::arg("material_sets"),
             py::arg("visibility"));
+}
+
+void bind_image_adders(py::class_<SceneDescription>& scene) {
     scene
         .def(
             "add_image",
@@ -434,12 +453,16 @@ void bind_adders(py::class_<SceneDescription>& scene) {
             py::arg("version") = 0)
         .def(
             "add_kept_image",
-            [](SceneDescription& s, std::string name, std::uint64_t version) {
-                return add_kept(s.images, std::move(name), version);
+            [](SceneDescription& s, const std::string& name, std::uint64_t version) {
+                return add_kept(s.images, name, version);
             },
             FloatGuard(),
             py::arg("name"),
-            py::arg("version"))
+            py::arg("version"));
+}
+
+void bind_light_adders_and_setters(py::class_<SceneDescription>& scene) {
+    scene
         .def(
             "add_light_program",
             [](SceneDescription& s, const NodeProgram& program) {
@@ -495,7 +518,10 @@ void bind_scene(py::module_& m) {
               }),
               FloatGuard(),
               py::arg("blender_version") = 304);
-    bind_adders(scene);
+    bind_mesh_adders(scene);
+    bind_material_adders(scene);
+    bind_image_adders(scene);
+    bind_light_adders_and_setters(scene);
     scene.def_readonly("blender_version", &SceneDescription::blender_version)
         .def_readonly("has_camera", &SceneDescription::has_camera)
         .def_readonly("camera", &SceneDescription::camera)

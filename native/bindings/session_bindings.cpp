@@ -92,6 +92,7 @@ void write_passes(const std::string& path,
                   std::uint32_t height,
                   const std::vector<PassTuple>& arrays) {
     std::vector<ExrPass> passes;
+    passes.reserve(arrays.size());
     for (const auto& [name, channels, pixels] : arrays) {
         passes.push_back(
             {name, channels, std::span(pixels.data(), static_cast<std::size_t>(pixels.size()))});

@@ -150,9 +150,9 @@ inline void evaluate_block(const NetworkView& view,
     }
 }
 
-void evaluate_kernel(const NetworkView& view,
-                     const FieldQuery& query,
-                     std::span<VmfMixture> mixtures) {
+inline void evaluate_kernel(const NetworkView& view,
+                            const FieldQuery& query,
+                            std::span<VmfMixture> mixtures) {
     constexpr int kBlock = 64;
     std::size_t first = 0;
     while (first < mixtures.size()) {
@@ -197,11 +197,11 @@ inline Activations forward_chunk(const NetworkView& view,
     return at;
 }
 
-void evaluate_chunk_kernel(const NetworkView& view,
-                           const TrainingColumns& columns,
-                           std::size_t first,
-                           float* workspace,
-                           float* pdf_and_integral) {
+inline void evaluate_chunk_kernel(const NetworkView& view,
+                                  const TrainingColumns& columns,
+                                  std::size_t first,
+                                  float* workspace,
+                                  float* pdf_and_integral) {
     const GuidingConfig& config = view.layout->config;
     const Activations at = forward_chunk(view, columns, first, workspace);
     const float* rows = at.rows[view.layout->layers];
@@ -215,11 +215,11 @@ void evaluate_chunk_kernel(const NetworkView& view,
     }
 }
 
-float train_chunk_kernel(const NetworkView& view,
-                         const TrainingColumns& columns,
-                         std::size_t first,
-                         float* workspace,
-                         float* gradient) {
+inline float train_chunk_kernel(const NetworkView& view,
+                                const TrainingColumns& columns,
+                                std::size_t first,
+                                float* workspace,
+                                float* gradient) {
     const NetworkLayout& layout = *view.layout;
     const GuidingConfig& config = layout.config;
     const Activations at = forward_chunk(view, columns, first, workspace);
@@ -263,24 +263,24 @@ float train_chunk_kernel(const NetworkView& view,
     return sum_lanes(loss);
 }
 
-void sample_mixtures_kernel(std::span<const VmfMixture> mixtures,
-                            std::span<const float> u_lobe,
-                            std::span<const Vec2> u,
-                            std::span<Vec3> wi) {
+inline void sample_mixtures_kernel(std::span<const VmfMixture> mixtures,
+                                   std::span<const float> u_lobe,
+                                   std::span<const Vec2> u,
+                                   std::span<Vec3> wi) {
     for (std::size_t i = 0; i < mixtures.size(); ++i) {
         wi[i] = HWY_NAMESPACE::sample_mixture(mixtures[i], u_lobe[i], u[i]);
     }
 }
 
-void mixture_pdfs_kernel(std::span<const VmfMixture> mixtures,
-                         std::span<const Vec3> wi,
-                         std::span<float> pdf) {
+inline void mixture_pdfs_kernel(std::span<const VmfMixture> mixtures,
+                                std::span<const Vec3> wi,
+                                std::span<float> pdf) {
     for (std::size_t i = 0; i < mixtures.size(); ++i) {
         pdf[i] = HWY_NAMESPACE::mixture_pdf(mixtures[i], wi[i]);
     }
 }
 
-void adam_kernel(const AdamStep& step, const AdamArrays& arrays) {
+inline void adam_kernel(const AdamStep& step, const AdamArrays& arrays) {
     const float* gradient = arrays.gradient.data();
     float* first = arrays.first_moment.data();
     float* second = arrays.second_moment.data();

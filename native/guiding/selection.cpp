@@ -183,8 +183,8 @@ void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records,
             continue;
         }
         const Contributions c = contributions(r);
-        expected[r.glossy] += static_cast<std::int64_t>(c.expected / kContributionUnit + 0.5);
-        arrived[r.glossy] += static_cast<std::int64_t>(c.arrived / kContributionUnit + 0.5);
+        expected[r.glossy] += std::llrint(c.expected / kContributionUnit);
+        arrived[r.glossy] += std::llrint(c.arrived / kContributionUnit);
     }
     for (std::size_t kind = 0; kind < 2; ++kind) {
         Contributions& sum = contributed[kind];

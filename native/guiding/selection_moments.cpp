@@ -43,8 +43,8 @@ bool PassSums::add(const std::array<double, kShares>& moments, double variance) 
     for (std::size_t a = 0; a < kShares; ++a) {
         const double value = moments[a] * unit;
         const double gain = moments[0] * unit - value;
-        moment[a] += static_cast<std::int64_t>(value / kMomentUnit + 0.5);
-        square[a] += static_cast<std::int64_t>(gain * gain / kSquareUnit + 0.5);
+        moment[a] += std::llrint(value / kMomentUnit);
+        square[a] += std::llrint(gain * gain / kSquareUnit);
     }
     return true;
 }

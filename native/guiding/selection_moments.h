@@ -91,7 +91,8 @@ class ShareTable {
 
     void set(std::uint32_t cell, std::uint8_t share) {
         std::uint8_t& byte = bytes_[cell / 4];
-        byte = static_cast<std::uint8_t>((byte & ~(3u << shift(cell))) | (share << shift(cell)));
+        byte = static_cast<std::uint8_t>((byte & ~(3u << shift(cell))) |
+                                         (unsigned{share} << shift(cell)));
     }
 
     // For archives: any content of this length is a table.

@@ -301,7 +301,7 @@ namespace {
 [[nodiscard]] std::string write_beside(const std::string& path,
                                        const char* format,
                                        const OIIO::ImageSpec& spec,
-                                       OIIO::TypeDesc type,
+                                       const OIIO::TypeDesc& type,
                                        const void* data) {
     const std::string part = path + ".part";
     std::remove(part.c_str());  // a link there would lead out of the folder

@@ -9,7 +9,6 @@ namespace pharos {
 
 namespace {
 
-using detail::kTexelPadding;
 using detail::SrgbTable;
 
 // Texels of one axis that a look-up reads; those outside of a clipped image weigh nothing.

@@ -115,7 +115,7 @@ std::string Compiler::compile_op(const NodeOp& op) {
             operands[k] = code;
             continue;
         }
-        const std::string error = resolve(code, shape.size[k], operands[k]);
+        std::string error = resolve(code, shape.size[k], operands[k]);
         if (!error.empty()) {
             return error;
         }
@@ -430,11 +430,8 @@ void Compiler::renumber() {
     std::vector<SurfaceInteraction> hits;
     for (int i = 0; i < (material.constant ? 1 : kSide * kSide * kSide); ++i) {
         SurfaceInteraction hit;
-        hit.p = (Vec3(static_cast<float>(i % kSide),
-                      static_cast<float>(i / kSide % kSide),
-                      static_cast<float>(i / (kSide * kSide))) +
-                 Vec3(0.5f)) /
-                static_cast<float>(kSide);
+        const glm::ivec3 cell(i % kSide, i / kSide % kSide, i / (kSide * kSide));
+        hit.p = (Vec3(cell) + Vec3(0.5f)) / static_cast<float>(kSide);
         hit.ng = hit.ns = hit.wo = Vec3(0.0f, 0.0f, 1.0f);
         hit.instance = hit.triangle = kNone;
         hits.push_back(hit);
@@ -463,7 +460,7 @@ void Compiler::renumber() {
 }  // namespace
 
 Material compile_material(std::string name,
-                          NodeProgram program,
+                          const NodeProgram& program,
                           SceneReport& report,
                           std::span<const Texture> textures) {
     Material material;

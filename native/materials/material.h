@@ -54,7 +54,7 @@ struct Material {
 // what needs no hit: constant values, dead operations, flags. `textures` (index = ImageUse::image)
 // serve the estimate of textured emission alone.
 [[nodiscard]] Material compile_material(std::string name,
-                                        NodeProgram program,
+                                        const NodeProgram& program,
                                         SceneReport& report,
                                         std::span<const Texture> textures = {});
 

@@ -267,7 +267,7 @@ constexpr Vec3 kHottestColor(0.8262955f, 0.99450803f, 1.56630766f);
     while (kelvin < piece->from) {
         --piece;
     }
-    const double t = kelvin;
+    const auto t = static_cast<double>(kelvin);
     const auto curve = [t](const std::array<double, 3>& c) { return c[0] / t + c[1] * t + c[2]; };
     const auto& b = piece->blue;
     const glm::dvec3 color(

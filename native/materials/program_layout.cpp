@@ -90,6 +90,27 @@ constexpr OpLayout kLayouts[] = {
            program.tables[index].size() % 4 == 0;
 }
 
+[[nodiscard]] bool texture_mode_exists(const NodeOp& op) {
+    switch (op.code) {
+        case NodeOpCode::Gradient:
+            return op.mode <= static_cast<std::uint16_t>(GradientMode::Spherical);
+        case NodeOpCode::Noise:
+            return op.mode <= 0xff && (op.mode >> 2 & 7) < kFractalTypes;
+        case NodeOpCode::Musgrave:
+            return op.mode < 4 * kFractalTypes;
+        case NodeOpCode::WhiteNoise:
+            return op.mode < 4;
+        case NodeOpCode::Voronoi:
+            return op.mode <= 0xff && (op.mode >> 2 & 7) < kCellFeatures;
+        case NodeOpCode::Wave:
+            return (op.mode & ~(kLegacyNoiseBit | 7)) <= 8 * static_cast<int>(WaveProfile::Tri);
+        case NodeOpCode::Magic:
+            return op.mode <= 10;
+        default:
+            return true;  // the mode is not looked at
+    }
+}
+
 [[nodiscard]] bool mode_exists(const NodeProgram& program, const NodeOp& op) {
     switch (op.code) {
         case NodeOpCode::Copy:
@@ -136,22 +157,8 @@ constexpr OpLayout kLayouts[] = {
         case NodeOpCode::SeparateColor:
         case NodeOpCode::CombineColor:
             return op.mode <= static_cast<std::uint16_t>(ColorModel::Hsl);
-        case NodeOpCode::Gradient:
-            return op.mode <= static_cast<std::uint16_t>(GradientMode::Spherical);
         case NodeOpCode::VectorTransform:
             return op.mode < 27;
-        case NodeOpCode::Noise:
-            return op.mode <= 0xff && (op.mode >> 2 & 7) < kFractalTypes;
-        case NodeOpCode::Musgrave:
-            return op.mode < 4 * kFractalTypes;
-        case NodeOpCode::WhiteNoise:
-            return op.mode < 4;
-        case NodeOpCode::Voronoi:
-            return op.mode <= 0xff && (op.mode >> 2 & 7) < kCellFeatures;
-        case NodeOpCode::Wave:
-            return (op.mode & ~(kLegacyNoiseBit | 7)) <= 8 * static_cast<int>(WaveProfile::Tri);
-        case NodeOpCode::Magic:
-            return op.mode <= 10;
         case NodeOpCode::VectorRotate:
             return below(op.mode, kInvertBit, 5);
         case NodeOpCode::Tangent:
@@ -169,7 +176,7 @@ constexpr OpLayout kLayouts[] = {
         case NodeOpCode::PrincipledV2:
             return op.mode <= static_cast<std::uint16_t>(Distribution::AshikhminShirley);
         default:
-            return true;  // the mode is not looked at
+            return texture_mode_exists(op);
     }
 }
 

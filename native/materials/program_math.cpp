@@ -59,16 +59,8 @@ namespace {
     return std::fmin(a, b) - h * h * h * k * (1.0f / 6.0f);
 }
 
-[[nodiscard]] float compute(MathMode mode, float a, float b, float c) {
+[[nodiscard]] float compute_angle(MathMode mode, float a, float b) {
     switch (mode) {
-        case MathMode::Add:
-            return a + b;
-        case MathMode::Subtract:
-            return a - b;
-        case MathMode::Multiply:
-            return a * b;
-        case MathMode::Divide:
-            return safe_divide(a, b);
         case MathMode::Sine:
             return std::sin(a);
         case MathMode::Cosine:
@@ -81,6 +73,33 @@ namespace {
             return std::acos(std::clamp(a, -1.0f, 1.0f));
         case MathMode::Arctangent:
             return std::atan(a);
+        case MathMode::Arctan2:
+            return std::atan2(a, b);
+        case MathMode::Radians:
+            return a * (kPi / 180.0f);
+        case MathMode::Degrees:
+            return a * (180.0f / kPi);
+        case MathMode::Sinh:
+            return std::sinh(a);
+        case MathMode::Cosh:
+            return std::cosh(a);
+        case MathMode::Tanh:
+            return std::tanh(a);
+        default:
+            return 0.0f;
+    }
+}
+
+[[nodiscard]] float compute(MathMode mode, float a, float b, float c) {
+    switch (mode) {
+        case MathMode::Add:
+            return a + b;
+        case MathMode::Subtract:
+            return a - b;
+        case MathMode::Multiply:
+            return a * b;
+        case MathMode::Divide:
+            return safe_divide(a, b);
         case MathMode::Power:
             return safe_pow(a, b);
         case MathMode::Logarithm:
@@ -99,8 +118,6 @@ namespace {
             return safe_modulo(a, b);
         case MathMode::Absolute:
             return std::abs(a);
-        case MathMode::Arctan2:
-            return std::atan2(a, b);
         case MathMode::Floor:
             return std::floor(a);
         case MathMode::Ceil:
@@ -115,16 +132,6 @@ namespace {
             return sign(a);
         case MathMode::Exponent:
             return std::exp(a);
-        case MathMode::Radians:
-            return a * (kPi / 180.0f);
-        case MathMode::Degrees:
-            return a * (180.0f / kPi);
-        case MathMode::Sinh:
-            return std::sinh(a);
-        case MathMode::Cosh:
-            return std::cosh(a);
-        case MathMode::Tanh:
-            return std::tanh(a);
         case MathMode::Trunc:
             return std::trunc(a);
         case MathMode::Snap:
@@ -143,8 +150,9 @@ namespace {
             return -smooth_minimum(-a, -b, c);
         case MathMode::FlooredModulo:
             return floored_modulo(a, b);
+        default:
+            return compute_angle(mode, a, b);
     }
-    return 0.0f;
 }
 
 template <class Function>

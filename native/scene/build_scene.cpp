@@ -204,25 +204,24 @@ void SceneBuild::load_textures() {
 }
 
 void SceneBuild::compile_materials() {
-    SceneDescription& d = scene_->description;
+    const SceneDescription& d = scene_->description;
     scene_->materials.reserve(d.materials.size() + 1);
-    for (MaterialDescription& material : d.materials) {
-        scene_->materials.push_back(compile_material(
-            material.name, std::move(material.program), report_, scene_->textures));
+    for (const MaterialDescription& material : d.materials) {
+        scene_->materials.push_back(
+            compile_material(material.name, material.program, report_, scene_->textures));
         scene_->materials.back().emission_sampling = material.emission_sampling;
         scene_->displacements.emplace_back();
         if (!material.displacement.ops.empty()) {
-            scene_->displacements.back() = compile_material(
-                material.name, std::move(material.displacement), report_, scene_->textures);
+            scene_->displacements.back() =
+                compile_material(material.name, material.displacement, report_, scene_->textures);
         }
     }
     scene_->displacements.emplace_back();
     scene_->materials.push_back(compile_material("Default", default_program(), report_));
-    scene_->world =
-        compile_material("World", std::move(d.world.program), report_, scene_->textures);
-    for (NodeProgram& program : d.light_programs) {
+    scene_->world = compile_material("World", d.world.program, report_, scene_->textures);
+    for (const NodeProgram& program : d.light_programs) {
         scene_->lamp_materials.push_back(
-            compile_material("Light", std::move(program), report_, scene_->textures));
+            compile_material("Light", program, report_, scene_->textures));
     }
 }
 

@@ -12,8 +12,8 @@ namespace pharos {
 namespace {
 
 constexpr double kRecordsPerPass = 32768.0;
-// Hard scenes starve on that: their records a vertex, and the most of a pass (lamp: 1.4 times less
-// error at equal time after 16 samples, 1.7 times after 64).
+// Hard scenes starve on that, few of their paths find the light: their records a vertex, and the
+// most of a pass.
 constexpr double kHardRecords = 0.4;
 constexpr double kMaxRecordsPerPass = 262144.0;
 // Where paths are quiet, learning takes no more than a few percent of a pass: records a vertex.
