@@ -37,9 +37,11 @@ constexpr double kMinNoiseFactor = 0.2;  // early variances are those of the pix
 // Nearly nothing is on: the whole machinery closes (with fewer where it is noisy, likewise).
 constexpr double kGateShare = 0.12;
 constexpr std::uint32_t kGatePasses = 9;  // after so many judged passes
-// Sooner in a quiet picture where the guide would do harm.
+// Sooner in a picture that is not noisy where the guide, asked everywhere, would gain next to
+// nothing: the few regions it helps do not pay for records, training and look-ups.
 constexpr std::uint32_t kHopelessPasses = 3;
-constexpr double kHopelessShare = 0.02;
+constexpr double kHopelessRatio = 0.99;  // of the global moments
+constexpr double kHopelessNoise = 0.4;   // least noise_factor
 constexpr std::uint32_t kProbeEvery = 64;
 constexpr std::uint32_t kProbePasses = 2;
 
@@ -287,8 +289,9 @@ void GuideSelection::Impl::update_gate(const SelectionStatistics& statistics) {
     const bool unused =
         judged_passes >= gate_at && statistics.guided_share < kGateShare * noise_factor;
     const bool first_time = gate_at == kGatePasses;
-    const bool hopeless = first_time && judged_passes >= kHopelessPasses && noise_factor >= 1.0 &&
-                          statistics.guided_share < kHopelessShare && statistics.moment_ratio > 1.0;
+    const bool hopeless = first_time && judged_passes >= kHopelessPasses &&
+                          noise_factor >= kHopelessNoise &&
+                          statistics.moment_ratio > kHopelessRatio;
     if (unused || hopeless) {
         closed = true;
         closed_passes = 0;
@@ -326,9 +329,12 @@ SelectionStatistics GuideSelection::update(std::span<const SelectionRecord> reco
         s.closed = false;
         s.gate_at = s.judged_passes + kProbePasses;
     }
-    if (std::isfinite(pass.relative_variance) && pass.relative_variance > 0.0 && pass.paths > 0.0) {
-        s.variance_sum = kDecay * s.variance_sum + pass.relative_variance * pass.paths;
-        s.variance_count = kDecay * s.variance_count + pass.paths;
+    if (std::isfinite(pass.relative_variance) && pass.relative_variance > 0.0) {
+        // Passes weigh as in the moments: by their records. The first ones are the noisiest and
+        // have the most, so that any other weight would let gains grow against the threshold.
+        const auto count = static_cast<double>(records.size());
+        s.variance_sum = kDecay * s.variance_sum + pass.relative_variance * count;
+        s.variance_count = kDecay * s.variance_count + count;
     }
     SelectionStatistics statistics;
     if (!s.closed && !records.empty() && s.variance_count > 0.0 && pass.vertices > 0.0) {

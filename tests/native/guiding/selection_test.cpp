@@ -128,7 +128,7 @@ TEST(Selection, EverywhereOnceMostIsOn) {
 
 // Where paths vary much, the weight window adds to the gain: fewer on-cells are enough.
 TEST(Selection, NoisyPicturesTurnOnEarlier) {
-    for (const double variance : {1.5, 30.0}) {
+    for (const double variance : {6.0, 30.0}) {
         GuideSelection selection(unit_box());
         Random random(7);
         SelectionStatistics statistics;
@@ -202,6 +202,26 @@ void expect_gate(double relative_variance, int expected_close) {
 TEST(Selection, GateClosesWhereNothingPaysAndOpensByPassNumber) {
     expect_gate(1.0, 2);
     expect_gate(8.0, 8);
+}
+
+// A few regions that gain do not pay for asking everywhere; many do.
+TEST(Selection, GateClosesWhereOnlyAFewRegionsGain) {
+    for (const int one_in : {100, 3}) {
+        GuideSelection selection(unit_box());
+        SelectionPass counted = work();
+        counted.relative_variance = 1.0;
+        Random random(9);
+        for (int pass = 0; pass < 4; ++pass) {
+            std::vector<SelectionRecord> records;
+            for (int i = 0; i < 3000; ++i) {
+                const bool gains = i % one_in == 0;
+                records.push_back(
+                    peaked_record(random, gains ? Vec3(0.1f) : Vec3(0.9f), gains, 0.0f));
+            }
+            selection.update(records, counted);
+        }
+        EXPECT_EQ(selection.closed(), one_in > 10) << one_in;
+    }
 }
 
 TEST(Selection, OrderOfRecordsDoesNotMatter) {
