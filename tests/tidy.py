@@ -2,7 +2,8 @@
 
     tidy.py --budget SECONDS --cache FOLDER [FILE...]
 
-A file counts as seen when its preprocessed text and .clang-tidy are the same as when it passed.
+A file counts as seen when its preprocessed text and every .clang-tidy above it are the same as when
+it passed.
 Files left over when the time is up are reported as skipped.
 """
 
@@ -43,7 +44,9 @@ def fingerprint(command, path):
     arguments = [word for word in arguments if word != "-MD"]
     text = subprocess.run([*arguments, "-E", "-P", "-C"], capture_output=True, check=False).stdout
     text = text.replace(str(ROOT).encode(), b"")
-    settings = (ROOT / ".clang-tidy").read_bytes()
+    settings = b"".join((folder / ".clang-tidy").read_bytes()
+                        for folder in (ROOT, ROOT / "tests")
+                        if path.is_relative_to(folder) and (folder / ".clang-tidy").exists())
     name = path.relative_to(ROOT).as_posix().encode()
     return hashlib.sha256(b"\0".join((name, settings, text))).hexdigest()
 

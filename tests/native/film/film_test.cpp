@@ -94,7 +94,7 @@ TEST(Film, PassesOnRequestAreMeansOrOfTheFirstSample) {
         values[layout.offset(FilmPass::Emission)] = x;
         values[layout.offset(FilmPass::ObjectIndex)] = x;
         values[layout.offset(FilmPass::Mist)] = 0.1f * x;
-        film.add_passes(0, values, x);
+        film.add_passes(0, values, static_cast<double>(x));
         film.add(0, {}, static_cast<double>(x), true);
     }
     film.set_pass(FilmPass::GuideShare, 0, std::vector<float>{0.5f});
