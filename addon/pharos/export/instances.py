@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -72,26 +73,36 @@ class InstanceExporter:
         self._add_instances(instances, self._walk(instances))
 
     def _walk(self, instances) -> int:
-        """Finds the runs; their end. The loop costs as much as what it asks Blender for."""
-        should_stop = self._context.should_stop
-        last_object = last_parent = kind = None
-        place, shown = -1, None
-        for place, instance in enumerate(instances):
-            if place % _POLL_INTERVAL == 0 and should_stop():
+        """Finds the runs; how many instances there are. Nearly all the time goes into what Blender
+        is asked for: of an instance like the one before, two things.
+        """
+        lasting = compat.LASTING_OBJECTS
+        last_object = last_parent = kind = shown = each = None
+        place, walked = -1, None
+        numbered = enumerate(instances)
+        while place != walked:
+            if self._context.should_stop():
                 raise Cancelled
-            obj, parent = instance.object, instance.parent
-            if obj is not last_object or parent is not last_parent or not compat.LASTING_OBJECTS:
-                last_object, last_parent = obj, parent
-                kind = self._kind(instance, obj, parent)
-                surface = kind.index if isinstance(kind, _Surface) else _NONE
-                if surface != shown:
-                    self._runs.append(_Run(place, surface))
-                    shown = surface
-            if kind is _LAMP:
-                self._add_light(instance)
-            elif kind is not None and kind.attributes:
-                self._note_attributes(instance, kind, place)
+            walked = place
+            for place, instance in islice(numbered, _POLL_INTERVAL):
+                obj, parent = instance.object, instance.parent
+                if obj is not last_object or parent is not last_parent or not lasting:
+                    last_object, last_parent = obj, parent
+                    kind = self._kind(instance, obj, parent)
+                    surface = _NONE if kind is None or kind is _LAMP else kind.index
+                    if surface != shown:
+                        self._runs.append(_Run(place, surface))
+                        shown = surface
+                    each = self._each(kind)
+                if each is not None:
+                    each(instance, kind, place)
         return place + 1
+
+    def _each(self, kind):
+        """What is done with each instance of a kind, beside counting it; None: nothing."""
+        if kind is _LAMP:
+            return self._add_light
+        return self._note_attributes if kind is not None and kind.attributes else None
 
     def _kind(self, instance, obj, parent):
         """What an instance shows: _LAMP, a surface, None. What is new is exported, unless the user
@@ -130,7 +141,7 @@ class InstanceExporter:
                 message = f"Hair {system.name!r} is not supported."
                 self._context.report.warn(obj.name, message, "OBJECT")
 
-    def _add_light(self, instance) -> None:
+    def _add_light(self, instance, _kind, _place: int) -> None:
         obj = instance.object
         self._context.description.add_light(
             name=obj.name,
