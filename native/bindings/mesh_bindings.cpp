@@ -221,6 +221,15 @@ void bind_meshes(py::module_& m, py::class_<SceneDescription>& scene) {
             FloatGuard(),
             py::arg("name"),
             py::arg("values"))
+        .def_property_readonly(
+            "instance_attributes",
+            [](const SceneDescription& s) {
+                py::dict out;
+                for (const InstanceAttribute& attribute : s.instance_attributes) {
+                    out[py::str(attribute.name)] = to_array<float>(attribute.values);
+                }
+                return out;
+            })
         .def("mesh", &mesh_as_dict, FloatGuard(), py::arg("index"));
 }
 
