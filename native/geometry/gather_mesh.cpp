@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <functional>
-#include <iterator>
 #include <stdexcept>
 #include <thread>
+#include <type_traits>
 #include <utility>
+
+#include <sys/mman.h>
 
 #include "core/parallel.h"
 
@@ -13,7 +15,9 @@ namespace pharos {
 
 namespace {
 
-constexpr std::size_t kWorthThreads = 50'000;  // triangles
+constexpr std::size_t kWorthThreads = 50'000;       // triangles
+constexpr std::size_t kWorthLargePages = 4u << 20;  // bytes; such a page has 2 MiB
+constexpr std::size_t kPage = 4096;
 
 void require(bool condition, const std::string& name, const std::string& what) {
     if (!condition) {
@@ -21,42 +25,30 @@ void require(bool condition, const std::string& name, const std::string& what) {
     }
 }
 
-// function(0), function(1), ... as an iterator, so that a vector is made of them without having
-// been zeroed before.
-template <class Function>
-class Generated {
-  public:
-    using iterator_category = std::random_access_iterator_tag;
-    using value_type = std::invoke_result_t<Function, std::size_t>;
-    using difference_type = std::ptrdiff_t;
-    using pointer = const value_type*;
-    using reference = value_type;
-
-    Generated(const Function& function, std::size_t i) : function_(&function), i_(i) {}
-
-    reference operator*() const { return (*function_)(i_); }
-
-    Generated& operator++() {
-        ++i_;
-        return *this;
+// An empty vector with room for so many, in large pages where that is much memory: the first touch
+// of each page costs more than what is written into it. Without such pages nothing changes.
+template <class T>
+std::vector<T> with_room(std::size_t count) {
+    std::vector<T> out;
+    out.reserve(count);
+    const std::size_t size = count * sizeof(T);
+    if (size >= kWorthLargePages) {
+        auto* begin = reinterpret_cast<std::byte*>(out.data());
+        const std::size_t before =
+            (kPage - reinterpret_cast<std::uintptr_t>(begin) % kPage) % kPage;
+        madvise(begin + before, (size - before) / kPage * kPage, MADV_HUGEPAGE);
     }
+    return out;
+}
 
-    difference_type operator-(const Generated& other) const {
-        return static_cast<difference_type>(i_ - other.i_);
-    }
-
-    bool operator==(const Generated& other) const { return i_ == other.i_; }
-
-  private:
-    const Function* function_;
-    std::size_t i_;
-};
-
+// function(0), function(1), ...
 template <class Function>
 auto generate(std::size_t count, const Function& function) {
-    using Iterator = Generated<Function>;
-    return std::vector<typename Iterator::value_type>(Iterator(function, 0),
-                                                      Iterator(function, count));
+    auto out = with_room<std::invoke_result_t<Function, std::size_t>>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        out.push_back(function(i));
+    }
+    return out;
 }
 
 template <class T>
@@ -74,8 +66,7 @@ struct Three {
 template <class T, class Function>
 std::vector<T> generate_threes(std::size_t triangles, const Function& function) {
     static_assert(sizeof(Three<T>) == 3 * sizeof(T));
-    std::vector<T> out;
-    out.reserve(3 * triangles);
+    auto out = with_room<T>(3 * triangles);
     for (std::size_t i = 0; i < triangles; ++i) {
         const Three<T> three = function(i);
         out.push_back(three.a);
