@@ -1,12 +1,14 @@
-// Scene descriptions: one call per thing, arrays copied once; read back by tests and panels.
+// Scene descriptions but for their meshes: one call per thing, arrays copied once; read back by
+// tests and panels.
+#include <algorithm>
 #include <cstring>
 #include <optional>
-#include <stdexcept>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/casters.h"
 #include "scene/dump.h"
@@ -17,151 +19,38 @@ namespace py = pybind11;
 namespace pharos {
 namespace {
 
-template <class T>
-using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
-
-void require(bool condition, const std::string& name, const char* what) {
-    if (!condition) {
-        throw std::invalid_argument(name + ": " + what);
-    }
-}
-
-template <class T>
-constexpr std::size_t components_of() {
-    if constexpr (std::is_arithmetic_v<T>) {
-        return 1;
-    } else {
-        return static_cast<std::size_t>(T::length());
-    }
-}
-
-// Rows of `components` scalars as a vector of T, which has that layout. The GIL is not held
-// meanwhile: `array` keeps the memory alive.
-template <class T, class Scalar>
-std::vector<T> copy_rows(const Array<Scalar>& array, const std::string& name, const char* what) {
-    constexpr std::size_t components = components_of<T>();
-    static_assert(sizeof(T) == components * sizeof(Scalar));
-    const auto size = static_cast<std::size_t>(array.size());
-    require(size % components == 0, name, what);
-    std::vector<T> out(size / components);
-    const Scalar* source = array.data();
-    const py::gil_scoped_release release;
-    if (size > 0) {
-        std::memcpy(static_cast<void*>(out.data()), source, size * sizeof(Scalar));
-    }
-    return out;
-}
-
-template <class Scalar, class T>
-py::array_t<Scalar> to_array(const std::vector<T>& rows) {
-    constexpr std::size_t components = components_of<T>();
-    static_assert(sizeof(T) == components * sizeof(Scalar));
-    py::array_t<Scalar> out({rows.size(), components});
-    if (!rows.empty()) {
-        const void* source = rows.data();
-        std::memcpy(out.mutable_data(), source, rows.size() * sizeof(T));
-    }
-    return out;
-}
-
-std::uint32_t index_of_last(std::size_t size) {
-    return static_cast<std::uint32_t>(size - 1);
-}
-
-using NamedUv = std::pair<std::string, Array<float>>;
-
-// (name, domain, rows of 1 to 4 numbers)
-using NamedValues = std::tuple<std::string, NormalDomain, Array<float>>;
-
-struct MeshArrays {
-    Array<float> positions;
-    Array<std::uint32_t> triangles;
-    NormalDomain normal_domain;
-    std::optional<Array<float>> normals;
-    std::optional<Array<std::uint16_t>> material_indices;
-    std::vector<NamedUv> uv_maps;
-    std::vector<NamedValues> attributes;
-    std::uint64_t version = 0;
-};
-
-std::uint32_t add_mesh(SceneDescription& scene, std::string name, const MeshArrays& arrays) {
-    Mesh mesh;
-    mesh.positions = copy_rows<Vec3>(arrays.positions, name, "positions are not triples");
-    mesh.triangles = copy_rows<UVec3>(arrays.triangles, name, "triangles are not triples");
-    mesh.normal_domain = arrays.normal_domain;
-    if (arrays.normals) {
-        mesh.normals = copy_rows<Vec3>(*arrays.normals, name, "normals are not triples");
-    }
-    if (arrays.material_indices) {
-        mesh.material_indices = copy_rows<std::uint16_t>(
-            *arrays.material_indices, name, "material indices are not a list");
-    }
-    for (const auto& [uv_name, uv] : arrays.uv_maps) {
-        mesh.uv_maps.push_back({uv_name, copy_rows<Vec2>(uv, name, "uv are not pairs")});
-    }
-    for (const auto& [attribute, domain, values] : arrays.attributes) {
-        require(values.ndim() == 2, name, "an attribute is no table");
-        mesh.attributes.push_back({attribute,
-                                   domain,
-                                   static_cast<std::uint32_t>(values.shape(1)),
-                                   copy_rows<float>(values, name, "attribute")});
-    }
-    const std::size_t normals = mesh.normal_domain == NormalDomain::Face ? 0
-                                : mesh.normal_domain == NormalDomain::Vertex
-                                    ? mesh.positions.size()
-                                    : 3 * mesh.triangles.size();
-    require(
-        mesh.normals.size() == normals, name, "the number of normals does not fit their domain");
-    require(mesh.material_indices.empty() || mesh.material_indices.size() == mesh.triangles.size(),
-            name,
-            "the number of material indices is not that of triangles");
-    for (const UvMap& map : mesh.uv_maps) {
-        require(map.uv.size() == 3 * mesh.triangles.size(),
-                name,
-                "a uv map does not have 3 per triangle");
-    }
-    mesh.name = std::move(name);
-    mesh.version = arrays.version;
-    scene.meshes.push_back(std::move(mesh));
-    return index_of_last(scene.meshes.size());
-}
-
-// A mesh or image that the receiver of the description knows by its version.
-template <class Thing>
-std::uint32_t add_kept(std::vector<Thing>& things, const std::string& name, std::uint64_t version) {
-    Thing& kept = things.emplace_back();
-    kept.name = name;
-    kept.version = version;
-    return index_of_last(things.size());
-}
-
 struct InstanceArrays {
-    Array<float> matrices;  // n x 16, column-major as Blender stores them
-    Array<std::uint32_t> meshes;
-    Array<std::uint32_t> material_sets;
-    Array<std::uint32_t> visibility;
+    Array<float> matrices;            // n x 16, column-major as Blender stores them
+    Array<std::uint32_t> surface_of;  // n: which row of `surfaces`
+    Array<std::uint32_t> surfaces;    // rows of mesh, material set, visibility
 };
 
 void add_instances(SceneDescription& scene,
                    const std::vector<std::string>& names,
                    const InstanceArrays& arrays) {
-    const std::size_t count = names.size();
-    const auto holds = [&](const auto& array, std::size_t each) {
-        return static_cast<std::size_t>(array.size()) == count * each;
-    };
-    require(holds(arrays.matrices, 16) && holds(arrays.meshes, 1) &&
-                holds(arrays.material_sets, 1) && holds(arrays.visibility, 1),
+    const auto count = static_cast<std::size_t>(arrays.surface_of.size());
+    require(static_cast<std::size_t>(arrays.matrices.size()) == 16 * count &&
+                static_cast<std::size_t>(arrays.surfaces.size()) == 3 * names.size(),
             "add_instances",
             "arrays of different lengths");
     const float* matrices = arrays.matrices.data();
+    const std::uint32_t* surface_of = arrays.surface_of.data();
+    const std::uint32_t* surfaces = arrays.surfaces.data();
+    const py::gil_scoped_release release;
+    require(std::all_of(surface_of,
+                        surface_of + count,
+                        [&](std::uint32_t surface) { return surface < names.size(); }),
+            "add_instances",
+            "a surface is beyond the end");
+    scene.instances.reserve(scene.instances.size() + count);
     for (std::size_t i = 0; i < count; ++i) {
-        InstanceDescription instance;
-        instance.name = names[i];
-        instance.mesh = arrays.meshes.data()[i];
-        instance.material_set = arrays.material_sets.data()[i];
-        instance.visibility = arrays.visibility.data()[i];
+        const std::size_t surface = surface_of[i];
+        InstanceDescription& instance = scene.instances.emplace_back();
+        instance.name = names[surface];
+        instance.mesh = surfaces[3 * surface];
+        instance.material_set = surfaces[3 * surface + 1];
+        instance.visibility = surfaces[3 * surface + 2];
         std::memcpy(static_cast<void*>(&instance.to_world), matrices + 16 * i, 16 * sizeof(float));
-        scene.instances.push_back(std::move(instance));
     }
 }
 
@@ -187,29 +76,6 @@ std::uint32_t add_image(SceneDescription& scene,
     }
     scene.images.push_back(std::move(image));
     return index_of_last(scene.images.size());
-}
-
-py::dict mesh_as_dict(const SceneDescription& scene, std::size_t index) {
-    const Mesh& mesh = scene.meshes.at(index);
-    py::dict uv_maps;
-    for (const UvMap& map : mesh.uv_maps) {
-        uv_maps[py::str(map.name)] = to_array<float>(map.uv);
-    }
-    py::dict out;
-    out["name"] = mesh.name;
-    out["positions"] = to_array<float>(mesh.positions);
-    out["triangles"] = to_array<std::uint32_t>(mesh.triangles);
-    out["normal_domain"] = mesh.normal_domain;
-    out["normals"] = to_array<float>(mesh.normals);
-    out["material_indices"] = to_array<std::uint16_t>(mesh.material_indices);
-    out["uv_maps"] = uv_maps;
-    py::dict attributes;
-    for (const MeshAttribute& attribute : mesh.attributes) {
-        attributes[py::str(attribute.name)] =
-            py::make_tuple(attribute.domain, to_array<float>(attribute.values));
-    }
-    out["attributes"] = attributes;
-    return out;
 }
 
 void bind_parts(py::module_& m) {
@@ -318,60 +184,6 @@ void bind_views(py::module_& m) {
         .def_readwrite("aovs", &PassesDescription::aovs);
 }
 
-void bind_mesh_adders(py::class_<SceneDescription>& scene) {
-    scene
-        .def(
-            "add_mesh",
-            [](SceneDescription& s,
-               std::string name,
-               Array<float> positions,
-               Array<std::uint32_t> triangles,
-               NormalDomain domain,
-               std::optional<Array<float>> normals,
-               std::optional<Array<std::uint16_t>> materials,
-               std::vector<NamedUv> uv_maps,
-               std::vector<NamedValues> attributes,
-               std::uint64_t version) {
-                return add_mesh(s,
-                                std::move(name),
-                                {std::move(positions),
-                                 std::move(triangles),
-                                 domain,
-                                 std::move(normals),
-                                 std::move(materials),
-                                 std::move(uv_maps),
-                                 std::move(attributes),
-                                 version});
-            },
-            FloatGuard(),
-            py::arg("name"),
-            py::arg("positions"),
-            py::arg("triangles"),
-            py::arg("normal_domain") = NormalDomain::Face,
-            py::arg("normals") = py::none(),
-            py::arg("material_indices") = py::none(),
-            py::arg("uv_maps") = std::vector<NamedUv>(),
-            py::arg("attributes") = std::vector<NamedValues>(),
-            py::arg("version") = 0)
-        .def(
-            "add_kept_mesh",
-            [](SceneDescription& s, const std::string& name, std::uint64_t version) {
-                return add_kept(s.meshes, name, version);
-            },
-            FloatGuard(),
-            py::arg("name"),
-            py::arg("version"))
-        .def(
-            "add_instance_attribute",
-            [](SceneDescription& s, std::string name, const Array<float>& values) {
-                auto rows = copy_rows<Vec4>(values, name, "values are not rows of four");
-                s.instance_attributes.push_back({std::move(name), std::move(rows)});
-            },
-            FloatGuard(),
-            py::arg("name"),
-            py::arg("values"));
-}
-
 void bind_material_adders(py::class_<SceneDescription>& scene) {
     scene
         .def(
@@ -404,23 +216,19 @@ void bind_material_adders(py::class_<SceneDescription>& scene) {
             "add_instances",
             [](SceneDescription& s,
                const std::vector<std::string>& names,
-               Array<float> matrices,
-               Array<std::uint32_t> meshes,
-               Array<std::uint32_t> material_sets,
-               Array<std::uint32_t> visibility) {
-                add_instances(s,
-                              names,
-                              {std::move(matrices),
-                               std::move(meshes),
-                               std::move(material_sets),
-                               std::move(visibility)});
+               Array<std::uint32_t> surfaces,
+               Array<std::uint32_t> surface_of,
+               Array<float> matrices) {
+                add_instances(
+                    s, names, {std::move(matrices), std::move(surface_of), std::move(surfaces)});
             },
             FloatGuard(),
             py::arg("names"),
+            py::arg("surfaces"),
+            py::arg("surface_of"),
             py::arg("matrices"),
-            py::arg("meshes"),
-            py::arg("material_sets"),
-            py::arg("visibility"));
+            "Instances of surfaces: name and row (mesh, material set, visibility) of each surface, "
+            "its number and 16 floats by column of each instance.");
 }
 
 void bind_image_adders(py::class_<SceneDescription>& scene) {
@@ -518,7 +326,7 @@ void bind_scene(py::module_& m) {
               }),
               FloatGuard(),
               py::arg("blender_version") = 304);
-    bind_mesh_adders(scene);
+    bind_meshes(m, scene);
     bind_material_adders(scene);
     bind_image_adders(scene);
     bind_light_adders_and_setters(scene);
@@ -537,8 +345,7 @@ void bind_scene(py::module_& m) {
         .def_property_readonly("mesh_count",
                                [](const SceneDescription& s) { return s.meshes.size(); })
         .def(
-            "copy", [](const SceneDescription& s) { return SceneDescription(s); }, FreeGuard())
-        .def("mesh", &mesh_as_dict, FloatGuard(), py::arg("index"));
+            "copy", [](const SceneDescription& s) { return SceneDescription(s); }, FreeGuard());
 
     m.attr("DISPLACE_IN_WORLD") = static_cast<int>(kDisplaceInWorld);
     m.def("write_dump", &write_dump, FreeGuard(), py::arg("description"), py::arg("path"));

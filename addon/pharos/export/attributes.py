@@ -47,21 +47,19 @@ def _raw_values(mesh, name: str):
 
 
 def read_attributes(mesh, names, report) -> list:
-    """(name, domain, rows) of what the mesh has of these names."""
+    """(name, domain, rows) of what the mesh has of these names: a row of 1 to 4 float32 for each
+    point, corner or face.
+    """
     found = []
     for name in sorted(names):
         raw = _raw_values(mesh, name)
         if raw is None:
             continue
         domain, rows = raw
-        if domain == "CORNER":
-            rows = rows[compat.triangle_corners(mesh).ravel()]
-        elif domain == "FACE":
-            rows = rows[compat.triangle_polygons(mesh)]
-        elif domain != "POINT":
+        if domain not in {"POINT", "CORNER", "FACE"}:
             report.warn(mesh.name, f"Attribute {name!r} of edges is not supported.", "MESH")
             continue
-        found.append((name, domain, np.ascontiguousarray(rows, np.float32)))
+        found.append((name, domain, rows))
     return found
 
 

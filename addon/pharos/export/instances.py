@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
-from .attributes import instance_value, read_attributes
+from .. import compat
+from .attributes import instance_value
 from .library import digest
 from .lights import light_fields
-from .meshes import add_mesh, evaluated_mesh, read_mesh
+from .meshes import evaluated_mesh, gather_mesh
 from .visibility import Visibility
 
 # Object types that are silently no surfaces.
@@ -32,13 +34,20 @@ class Cancelled(Exception):
 class _Surface(NamedTuple):
     """A mesh as one object shows it."""
 
-    row: tuple[int, int, int]  # mesh, material set, visibility
-    name: str
-    pass_index: int
+    index: int  # of those in the description
     attributes: frozenset
 
 
+class _Run(NamedTuple):
+    """Instances that follow each other and show the same, up to the next run."""
+
+    first: int  # place in depsgraph.object_instances
+    surface: int  # or _NONE
+
+
 _LAMP = object()
+_NONE = -1  # no surface
+_POLL_INTERVAL = 256  # instances between two questions whether to stop
 
 
 class InstanceExporter:
@@ -50,44 +59,67 @@ class InstanceExporter:
         self._visibility = Visibility(
             context.native, context.scene, context.view_layer, context.report
         )
-        self._surfaces: dict[tuple, object] = {}  # by object, data, instancer, hair
+        self._kinds: dict[tuple, object] = {}  # by data, object and instancer
         self._meshes: dict[tuple, int | None] = {}
         self._sent: dict[int, int] = {}  # index in the description by version
-        self._names: list[str] = []
-        self._attributes: dict[str, dict[int, tuple]] = {}  # by name and row
-        self._rows: list[tuple[int, int, int, int]] = []  # place in depsgraph, mesh, set, bits
+        self._names: list[str] = []  # of surfaces
+        self._pass_indices: list[int] = []
+        self._rows: list[tuple[int, int, int]] = []  # mesh, material set, visibility
+        self._attributes: dict[str, dict[int, tuple]] = {}  # by name and place
+        self._runs: list[_Run] = []
 
     def run(self) -> None:
         instances = self._context.depsgraph.object_instances
-        matrices = np.empty((len(instances), 16), np.float32)
-        if len(instances):
-            instances.foreach_get("matrix_world", matrices.ravel())
-        for place, instance in enumerate(instances):
+        self._add_instances(instances, self._walk(instances))
+
+    def _walk(self, instances) -> int:
+        """Finds the runs; how many instances there are. Nearly all the time goes into what Blender
+        is asked for: of an instance like the one before, two things.
+        """
+        lasting = compat.LASTING_OBJECTS
+        last_object = last_parent = kind = shown = each = None
+        place, walked = -1, None
+        numbered = enumerate(instances)
+        while place != walked:
             if self._context.should_stop():
                 raise Cancelled
-            if instance.show_self:
-                self._visit(instance, place)
-        self._add_rows(matrices)
+            walked = place
+            for place, instance in islice(numbered, _POLL_INTERVAL):
+                obj, parent = instance.object, instance.parent
+                if obj is not last_object or parent is not last_parent or not lasting:
+                    last_object, last_parent = obj, parent
+                    kind = self._kind(instance, obj, parent)
+                    surface = _NONE if kind is None or kind is _LAMP else kind.index
+                    if surface != shown:
+                        self._runs.append(_Run(place, surface))
+                        shown = surface
+                    each = self._each(kind)
+                if each is not None:
+                    each(instance, kind, place)
+        return place + 1
 
-    def _visit(self, instance, place: int) -> None:
-        """All but the first instance of an object cost no more than finding that out."""
-        obj = instance.object
-        parent = instance.parent if instance.is_instance else None
+    def _each(self, kind):
+        """What is done with each instance of a kind, beside counting it; None: nothing."""
+        if kind is _LAMP:
+            return self._add_light
+        return self._note_attributes if kind is not None and kind.attributes else None
+
+    def _kind(self, instance, obj, parent):
+        """What an instance shows: _LAMP, a surface, None. What is new is exported, unless the user
+        stops that.
+        """
         # What stands in for an object while it is instanced is always at the same place in memory.
         data = obj.data
         key = (
-            obj.original.as_pointer(),
-            data.as_pointer() if data is not None else 0,
-            parent.as_pointer() if parent is not None else 0,
-            instance.show_particles,
+            compat.address(data) if data is not None else 0,
+            compat.address(obj.original),
+            compat.address(parent) if parent is not None else 0,
         )
-        if key not in self._surfaces:
-            self._surfaces[key] = self._first_of(instance, obj)
-        kind = self._surfaces[key]
-        if kind is _LAMP:
-            self._add_light(instance)
-        elif kind is not None:
-            self._add_surface(instance, kind, place)
+        if key not in self._kinds:
+            if self._context.should_stop():
+                raise Cancelled
+            self._kinds[key] = self._first_of(instance, obj) if instance.show_self else None
+        return self._kinds[key]
 
     def _first_of(self, instance, obj):
         """What all instances of an object share: _LAMP, a surface, None; names what is missing."""
@@ -109,7 +141,7 @@ class InstanceExporter:
                 message = f"Hair {system.name!r} is not supported."
                 self._context.report.warn(obj.name, message, "OBJECT")
 
-    def _add_light(self, instance) -> None:
+    def _add_light(self, instance, _kind, _place: int) -> None:
         obj = instance.object
         self._context.description.add_light(
             name=obj.name,
@@ -128,16 +160,15 @@ class InstanceExporter:
         mesh = self._mesh_index(obj, with_uv, materials.mesh_attributes)
         if mesh is None:
             return None
-        row = (mesh, materials.index, bits)
-        return _Surface(row, obj.name, obj.pass_index, materials.instance_attributes)
+        self._names.append(obj.name)
+        self._pass_indices.append(obj.pass_index)
+        self._rows.append((mesh, materials.index, bits))
+        return _Surface(len(self._rows) - 1, materials.instance_attributes)
 
-    def _add_surface(self, instance, surface: _Surface, place: int) -> None:
-        self._names.append(surface.name)
-        self._context.passes.object_indices.append(surface.pass_index)
+    def _note_attributes(self, instance, surface: _Surface, place: int) -> None:
         for name in surface.attributes:
             values = self._attributes.setdefault(name, {})
-            values[len(self._rows)] = instance_value(self._native, instance, name)
-        self._rows.append((place, *surface.row))
+            values[place] = instance_value(self._native, instance, name)
 
     def _mesh_index(self, obj, uses_uv: bool, attributes: frozenset) -> int | None:
         slots = len(obj.material_slots)
@@ -163,40 +194,47 @@ class InstanceExporter:
         return self._sent[version]
 
     def _read(self, obj, slots: int, uses_uv: bool, attributes: frozenset, place) -> int | None:
+        name = obj.data.name
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
-            arrays = read_mesh(mesh, slots, uses_uv)
-            if arrays is None:
+            needs = (slots, uses_uv, attributes)
+            gathered = gather_mesh(self._native, name, mesh, needs, self._context.report)
+            if gathered is None:
                 return None
-            if attributes:
-                found = read_attributes(mesh, attributes, self._context.report)
-                arrays = arrays._replace(attributes=found)
             self._context.progress(obj.name)
-            return self._add_mesh(obj.data.name, arrays, place)
+        return self._add_mesh(name, gathered, place)
 
-    def _add_mesh(self, name: str, arrays, place) -> int:
+    def _add_mesh(self, name: str, mesh, place) -> int:
         description, library = self._context.description, self._context.library
         if library is None:
-            return add_mesh(self._native, description, name, arrays)
-        version, known = library.meshes.of(digest(arrays), place)
+            return description.add_mesh(mesh)
+        version, known = library.meshes.of(digest(mesh.content), place)
         if known:
             return self._add_kept(name, version)
-        self._sent[version] = add_mesh(self._native, description, name, arrays, version)
+        self._sent[version] = description.add_mesh(mesh, version)
         return self._sent[version]
 
-    def _add_rows(self, matrices: np.ndarray) -> None:
+    def _add_instances(self, instances, count: int) -> None:
+        """All at once, `count` being the number of what was walked."""
         if not self._rows:
             return
-        rows = np.array(self._rows, np.uint32)
+        firsts = np.array([run.first for run in self._runs] + [count])
+        shown = np.repeat([run.surface for run in self._runs], np.diff(firsts))
+        places = np.flatnonzero(shown != _NONE)
+        # A length of these would be found by walking them.
+        matrices = np.empty((count, 16), np.float32)
+        instances.foreach_get("matrix_world", matrices.ravel())
+        if len(places) != count:
+            shown, matrices = shown[places], matrices[places]
+        self._context.passes.object_indices += np.take(self._pass_indices, shown).tolist()
         self._context.description.add_instances(
             names=self._names,
-            matrices=matrices[rows[:, 0]],
-            meshes=rows[:, 1],
-            material_sets=rows[:, 2],
-            visibility=rows[:, 3],
+            surfaces=np.array(self._rows, np.uint32),
+            surface_of=shown.astype(np.uint32),
+            matrices=matrices,
         )
         for name, values in self._attributes.items():
-            table = np.zeros((len(self._rows), 4), np.float32)
-            table[list(values)] = list(values.values())
+            table = np.zeros((len(places), 4), np.float32)
+            table[np.searchsorted(places, list(values))] = list(values.values())
             self._context.description.add_instance_attribute(name, table)

@@ -1,27 +1,13 @@
-"""Evaluated meshes as arrays: triangles, normals of the cheapest domain, materials, UV maps."""
+"""Evaluated meshes: what Blender holds of them, for the native module to gather triangles from."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import NamedTuple
-
-import numpy as np
 
 from .. import compat
+from .attributes import read_attributes
 
 _DOMAINS = {"FACE": "Face", "POINT": "Vertex", "CORNER": "Corner"}
-
-
-class MeshArrays(NamedTuple):
-    """What add_mesh takes."""
-
-    positions: np.ndarray
-    triangles: np.ndarray
-    domain: str
-    normals: np.ndarray | None
-    material_indices: np.ndarray | None
-    uv_maps: list
-    attributes: tuple = ()
 
 
 @contextmanager
@@ -41,87 +27,46 @@ def evaluated_mesh(obj):
             obj.to_mesh_clear()
 
 
-def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit geometric normals; zero for degenerate triangles."""
-    a, b, c = (positions[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.where(length > 0.0, normals / length, 0.0).astype(np.float32)
+def _slots(mesh, slot_count: int):
+    """The slot of each polygon; None where all have the first."""
+    slots = compat.polygon_materials(mesh) if slot_count > 1 else None
+    return slots if slots is not None and slots.any() else None
 
 
-def _corner_normals(mesh, positions, triangles, corners) -> np.ndarray:
-    """Corner normals, flat triangles with their own plane's as they are not interpolated."""
-    normals = compat.corner_normals(mesh)[corners]
-    smooth = compat.polygon_smooth(mesh)
-    if not smooth.all():
-        flat = ~smooth[compat.triangle_polygons(mesh)]
-        normals[flat] = face_normals(positions, triangles[flat])[:, None, :]
-    return normals.reshape(-1, 3)
-
-
-def _normals(mesh, positions, triangles, corners):
-    domain = compat.normal_domain(mesh)
-    if domain == "FACE":
-        return domain, None
-    if domain == "POINT":
-        return domain, compat.vertex_normals(mesh)
-    return domain, _corner_normals(mesh, positions, triangles, corners)
-
-
-def _material_indices(mesh, slot_count: int) -> np.ndarray | None:
-    if slot_count < 2:
-        return None
-    per_polygon = compat.polygon_materials(mesh)
-    if not per_polygon.any():
-        return None
-    clamped = np.clip(per_polygon, 0, slot_count - 1).astype(np.uint16)
-    return clamped[compat.triangle_polygons(mesh)]
-
-
-def _uv_maps(mesh, corners: np.ndarray) -> list:
+def _uv_maps(mesh) -> list:
     """The map that is rendered by default comes first."""
     layers = sorted(mesh.uv_layers, key=lambda layer: not layer.active_render)
     count = len(mesh.loops)
-    flat = corners.ravel()
-    found = []
-    for layer in layers:
-        # Both coordinates at once, as one number of 64 bits.
-        pairs = compat.uv_coordinates(layer, count).view(np.int64).ravel()
-        found.append((layer.name, pairs.take(flat).view(np.float32).reshape(-1, 2)))
-    return found
+    return [(layer.name, compat.uv_coordinates(layer, count)) for layer in layers]
 
 
-def read_mesh(mesh, slot_count: int, with_uv: bool) -> MeshArrays | None:
-    """None for a mesh without faces."""
+def gather_mesh(native, name: str, mesh, needs, report):
+    """The native module's Mesh, None without faces. `needs`: number of slots, whether with UV maps,
+    names of attributes. Raises ValueError with the name for a mesh that contradicts itself.
+    """
+    slot_count, with_uv, names = needs
     corners = compat.triangle_corners(mesh)
     if not len(corners):
         return None
-    positions = compat.mesh_positions(mesh)
-    triangles = compat.corner_vertices(mesh)[corners]
-    domain, normals = _normals(mesh, positions, triangles, corners)
-    return MeshArrays(
-        positions,
-        triangles,
-        _DOMAINS[domain],
-        normals,
-        _material_indices(mesh, slot_count),
-        _uv_maps(mesh, corners) if with_uv else [],
-    )
-
-
-def add_mesh(native, description, name: str, arrays: MeshArrays, version: int = 0) -> int:
-    return description.add_mesh(
-        name=name,
-        version=version,
-        positions=arrays.positions,
-        triangles=arrays.triangles,
-        normal_domain=getattr(native.NormalDomain, arrays.domain),
-        normals=arrays.normals,
-        material_indices=arrays.material_indices,
-        uv_maps=arrays.uv_maps,
+    normals = compat.mesh_normals(mesh)
+    slots = _slots(mesh, slot_count)
+    attributes = read_attributes(mesh, names, report) if names else []
+    by_polygon = any(domain == "FACE" for _, domain, _ in attributes)
+    by_polygon = by_polygon or slots is not None or normals.smooth is not None
+    return native.gather_mesh(
+        name,
+        positions=compat.mesh_positions(mesh),
+        corner_vertices=compat.corner_vertices(mesh),
+        triangle_corners=corners,
+        triangle_polygons=compat.triangle_polygons(mesh) if by_polygon else None,
+        normal_domain=getattr(native.NormalDomain, _DOMAINS[normals.domain]),
+        normals=normals.rows,
+        smooth=normals.smooth,
+        material_slot=slots,
+        last_slot=min(max(slot_count, 1), 1 << 16) - 1,
+        uv_maps=_uv_maps(mesh) if with_uv else [],
         attributes=[
-            (name, getattr(native.NormalDomain, _DOMAINS[where]), values)
-            for name, where, values in arrays.attributes
+            (attribute, getattr(native.NormalDomain, _DOMAINS[domain]), rows)
+            for attribute, domain, rows in attributes
         ],
     )
