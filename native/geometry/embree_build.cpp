@@ -52,6 +52,8 @@ struct Commit {
     std::condition_variable changed;
     bool done = false;
     RTCError error = RTC_ERROR_NONE;
+    std::shared_ptr<Commit> itself;  // see never_destroy
+    const Commit* before = nullptr;
 
     void run() {
         const FloatStateGuard float_state;
@@ -96,6 +98,24 @@ class AbandonedBuilds {
     std::mutex mutex_;
     std::vector<Build> builds_;
 };
+
+// Where TBB was refused memory or a thread it has lost a task of the build, and the end of the
+// scene would wait for it for ever: such scenes are never destroyed. Nothing may be allocated here.
+void never_destroy(const std::shared_ptr<Commit>& commit) {
+    static std::mutex mutex;
+    static constinit const Commit* newest = nullptr;  // reachable: no leak to a sanitizer
+    const std::lock_guard lock(mutex);
+    commit->before = newest;
+    commit->itself = commit;
+    newest = commit.get();
+}
+
+// The system's refusal, as opposed to that of on_memory and on_progress, which Embree expects.
+bool is_refused_by_system(const EmbreeDevice& device, RTCError error) {
+    return (error == RTC_ERROR_OUT_OF_MEMORY || error == RTC_ERROR_UNKNOWN) &&
+           !device.full.load(std::memory_order_relaxed) &&
+           !device.stop.load(std::memory_order_relaxed);
+}
 
 }  // namespace
 
@@ -145,6 +165,7 @@ void throw_if_failed(const EmbreeDevice& device, RTCError error) {
         case RTC_ERROR_NONE:
             return;
         case RTC_ERROR_OUT_OF_MEMORY:
+        case RTC_ERROR_UNKNOWN:  // a thread that found no place for its stack
             throw std::bad_alloc();
         case RTC_ERROR_CANCELLED:
             if (device.full.load(std::memory_order_relaxed)) {
@@ -174,6 +195,9 @@ void commit_scene(const BuildTarget& target, std::size_t primitives, const Cance
             }
             throw Cancelled();
         }
+    }
+    if (is_refused_by_system(*target.device, commit->error)) {
+        never_destroy(commit);
     }
     throw_if_cancelled(cancel);
     throw_if_failed(*target.device, commit->error);
