@@ -244,8 +244,19 @@ suite_blasan() {
         test_robustness test_interruptions test_viewport.py
 }
 
+# What our suppressions must not hide: succeeds when the race is reported.
+report_planted_race() {
+    local program=$LOGS/planted_race
+    g++ -std=c++20 -fsanitize=thread -g -O1 "$PHAROS_ROOT/tests/suppressions/planted_race.cpp" -o "$program" || return
+    TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:exitcode=66 "$program"
+    [ $? = 66 ]
+}
+
 suite_tsan() {
     local modules
+    export -f report_planted_race
+    export LOGS PHAROS_ROOT
+    check planted_race 120 bash -c report_planted_race
     mapfile -t modules < <(tested_modules session core film)
     build_or_fail tsan "${modules[@]/%/_test}" || return
     TSAN_OPTIONS=suppressions=$PHAROS_ROOT/tests/suppressions/threads.txt:halt_on_error=0 \

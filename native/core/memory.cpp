@@ -6,6 +6,7 @@
 #include <new>
 #include <string>
 #include <system_error>
+#include <thread>
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -27,6 +28,14 @@ std::uint64_t read_kilobytes(const char* path, const std::string& key) {
     return std::numeric_limits<std::uint64_t>::max();
 }
 
+// Libraries start threads as they go, one per core, and each takes address space for its stack and
+// for a heap of its own. TBB loses a task where it cannot start one, and waits for it for ever.
+std::uint64_t address_space_of_threads() {
+    constexpr std::uint64_t kThread = std::uint64_t{72} << 20;  // a stack, and glibc's arena
+    constexpr std::uint64_t kSpare = std::uint64_t{64} << 20;
+    return kThread * std::thread::hardware_concurrency() + kSpare;
+}
+
 // Address space left under RLIMIT_AS.
 std::uint64_t address_space_left() {
     rlimit limit{};
@@ -36,6 +45,7 @@ std::uint64_t address_space_left() {
         return std::numeric_limits<std::uint64_t>::max();
     }
     used *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+    used += address_space_of_threads();
     return limit.rlim_cur > used ? limit.rlim_cur - used : 0;
 }
 

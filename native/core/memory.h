@@ -6,7 +6,8 @@
 
 namespace pharos {
 
-// Bytes, by the process' own limit (RLIMIT_AS) and by what the machine has free.
+// Bytes, by the process' own limit (RLIMIT_AS) and by what the machine has free. Of the limit, what
+// the libraries' threads need is left to them.
 [[nodiscard]] std::uint64_t available_memory();
 
 // True for what is thrown where memory has run out: std::bad_alloc, and the error of a thread that

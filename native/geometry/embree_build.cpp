@@ -46,18 +46,27 @@ bool on_progress(void* user, double /*fraction*/) {
            !device.stop.load(std::memory_order_relaxed);
 }
 
+// A function of its own, which the suppressions of the thread sanitizer name: the exception of a
+// build that on_memory or on_progress ends crosses threads inside TBB.
+[[gnu::noinline]] RTCError commit_with_embree(const BuildTarget& target) {
+    rtcCommitScene(target.scene);
+    return rtcGetDeviceError(target.device->device.get());  // errors are kept by thread
+}
+
 struct Commit {
     BuildTarget target;
     std::mutex mutex;
     std::condition_variable changed;
     bool done = false;
     RTCError error = RTC_ERROR_NONE;
+    std::shared_ptr<Commit> itself;  // see never_destroy
+    const Commit* before = nullptr;
 
     void run() {
         const FloatStateGuard float_state;
-        rtcCommitScene(target.scene);
+        const RTCError ended_with = commit_with_embree(target);
         const std::lock_guard lock(mutex);
-        error = rtcGetDeviceError(target.device->device.get());  // errors are kept by thread
+        error = ended_with;
         done = true;
         changed.notify_all();
     }
@@ -96,6 +105,24 @@ class AbandonedBuilds {
     std::mutex mutex_;
     std::vector<Build> builds_;
 };
+
+// Where TBB was refused memory or a thread it has lost a task of the build, and the end of the
+// scene would wait for it for ever: such scenes are never destroyed. Nothing may be allocated here.
+void never_destroy(const std::shared_ptr<Commit>& commit) {
+    static std::mutex mutex;
+    static constinit const Commit* newest = nullptr;  // reachable: no leak to a sanitizer
+    const std::lock_guard lock(mutex);
+    commit->before = newest;
+    commit->itself = commit;
+    newest = commit.get();
+}
+
+// The system's refusal, as opposed to that of on_memory and on_progress, which Embree expects.
+bool is_refused_by_system(const EmbreeDevice& device, RTCError error) {
+    return (error == RTC_ERROR_OUT_OF_MEMORY || error == RTC_ERROR_UNKNOWN) &&
+           !device.full.load(std::memory_order_relaxed) &&
+           !device.stop.load(std::memory_order_relaxed);
+}
 
 }  // namespace
 
@@ -145,6 +172,7 @@ void throw_if_failed(const EmbreeDevice& device, RTCError error) {
         case RTC_ERROR_NONE:
             return;
         case RTC_ERROR_OUT_OF_MEMORY:
+        case RTC_ERROR_UNKNOWN:  // a thread that found no place for its stack
             throw std::bad_alloc();
         case RTC_ERROR_CANCELLED:
             if (device.full.load(std::memory_order_relaxed)) {
@@ -174,6 +202,9 @@ void commit_scene(const BuildTarget& target, std::size_t primitives, const Cance
             }
             throw Cancelled();
         }
+    }
+    if (is_refused_by_system(*target.device, commit->error)) {
+        never_destroy(commit);
     }
     throw_if_cancelled(cancel);
     throw_if_failed(*target.device, commit->error);

@@ -91,6 +91,13 @@ using Clock = std::chrono::steady_clock;
     return options;
 }
 
+// A render's end by its time limit. Thirty years are enough: more is more than the clock can count.
+[[nodiscard]] Clock::time_point deadline_after(Clock::time_point begin, float seconds) {
+    constexpr float kMostSeconds = 1e9f;
+    return begin + std::chrono::duration_cast<Clock::duration>(
+                       std::chrono::duration<float>(std::min(seconds, kMostSeconds)));
+}
+
 constexpr const char* kOutOfMemory = "Out of memory: the scene does not fit.";
 
 }  // namespace
@@ -327,8 +334,7 @@ void RenderSession::Impl::render_passes(const RenderSettings& settings,
     while (done < settings.samples) {
         if (settings.time_limit > 0.0f && done > 0) {
             // Only after the first pass: every pixel has a sample by then.
-            stop.deadline = begin + std::chrono::duration_cast<Clock::duration>(
-                                        std::chrono::duration<float>(settings.time_limit));
+            stop.deadline = deadline_after(begin, settings.time_limit);
         }
         PassSettings pass = next_pass(done, settings.samples, pixels);
         pass.samples =

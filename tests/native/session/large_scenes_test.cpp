@@ -157,13 +157,21 @@ TEST(Memory, EstimateIsNotOverTheTruth) {
     EXPECT_GT(available_memory(), std::uint64_t{1} << 20);
 }
 
-// Scripts that need a scene without Blender ask for this one: PHAROS_WRITE_DUMP names the file.
+// Scripts that need a scene without Blender ask for this one: PHAROS_WRITE_DUMP names the file, and
+// PHAROS_DUMP_RINGS adds a ball of twice its square in triangles.
 TEST(Scripts, TakeADumpFromHere) {
     const ScratchFolder folder;
     const char* wanted = std::getenv("PHAROS_WRITE_DUMP");
     const std::string path = wanted != nullptr ? wanted : folder.file("scene.pharos");
-    write_dump(two_rooms(96, 72, 8), path);
-    EXPECT_EQ(read_dump(path).instances.size(), two_rooms(96, 72, 8).instances.size());
+    SceneDescription d = two_rooms(96, 72, 8);
+    if (const char* rings = std::getenv("PHAROS_DUMP_RINGS"); rings != nullptr) {
+        const auto count = static_cast<std::uint32_t>(std::atoi(rings));
+        d.meshes.push_back(sphere_mesh("ball", Vec3(0, -1, 1), 0.2f, count, count));
+        d.instances.push_back(d.instances.back());
+        d.instances.back().mesh = static_cast<std::uint32_t>(d.meshes.size() - 1);
+    }
+    write_dump(d, path);
+    EXPECT_EQ(read_dump(path).instances.size(), d.instances.size());
 }
 
 // At any moment of building, passes and training: the end comes soon, and the next render is right.

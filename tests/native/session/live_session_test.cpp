@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -14,7 +15,7 @@ using namespace pharos::testing;
 
 constexpr std::uint32_t kWidth = 40;
 constexpr std::uint32_t kHeight = 30;
-constexpr std::chrono::seconds kPatience(60);
+constexpr std::chrono::seconds kPatience(static_cast<int>(60 * kSlowdown));
 
 // Two rooms as a host describes them to a live session: every mesh has a version.
 SceneDescription versioned_rooms(std::uint32_t samples) {

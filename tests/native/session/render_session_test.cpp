@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <span>
 
 #include <gtest/gtest.h>
@@ -213,6 +214,21 @@ TEST(RenderSession, TimeLimitStopsAndDelivers) {
         return elapsed;
     });
     EXPECT_LT(seconds, kBar);
+}
+
+// Found by fuzz_scene: as nanoseconds they are no 64-bit number, and the deadline was in the past.
+TEST(RenderSession, TimeLimitsBeyondTheClockAreNone) {
+    for (const float limit : {1e10f, 1.76805e34f, std::numeric_limits<float>::infinity()}) {
+        SceneDescription description = room(8, 8, 6);
+        description.settings.time_limit = limit;
+        SessionOptions options;
+        options.threads = 1;
+        options.pass_samples = 1;
+        RenderSession session(std::move(description), options);
+        ASSERT_TRUE(session.wait(std::chrono::seconds(60)));
+        EXPECT_EQ(session.progress().state, SessionState::Finished);
+        EXPECT_EQ(session.progress().samples, 6u) << limit;
+    }
 }
 
 TEST(RenderSession, PassesAreNoLongerThanAsked) {
