@@ -54,7 +54,9 @@ LightDescription wild_lamp(Random& r) {
     d.soft_falloff = r.index(2) == 0;
     d.normalize = r.index(2) == 0;
     if (r.index(3) == 0) {
-        d.to_world[r.index(4)][r.index(3)] = wild(r);
+        const auto column = static_cast<int>(r.index(4));
+        const auto row = static_cast<int>(r.index(3));
+        d.to_world[column][row] = wild(r);
     }
     return d;
 }

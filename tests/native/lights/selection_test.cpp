@@ -166,7 +166,7 @@ TEST(LightTree, ProbabilitiesAreThoseOfTheChoiceAndAddUp) {
             EXPECT_LT(sum, 1.0 + 1e-4);
             EXPECT_GT(sum, 0.9);
             for (int k = 0; k < 200; ++k) {
-                const auto choice = tree.choose(context, random.uniform());
+                const auto choice = tree.choose(context, static_cast<double>(random.uniform()));
                 if (choice) {
                     EXPECT_NEAR(choice->pmf / tree.pmf(context, choice->group), 1.0f, 1e-4f);
                     EXPECT_TRUE(choice->u >= 0.0 && choice->u < 1.0);

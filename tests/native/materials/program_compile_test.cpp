@@ -376,9 +376,9 @@ TEST(ProgramCompile, EmptyProgramsAreBlack) {
 
 // Each of these breaks a working program in one way.
 TEST(ProgramCompile, BrokenProgramsAreReportedAndGrey) {
-    const auto expect_broken = [](const char* what, NodeProgram program) {
+    const auto expect_broken = [](const char* what, const NodeProgram& program) {
         SceneReport report;
-        const Material material = compile_material("broken", std::move(program), report);
+        const Material material = compile_material("broken", program, report);
         ASSERT_EQ(report.entries().size(), 1u) << what;
         EXPECT_EQ(report.entries()[0].object, "broken");
         EXPECT_EQ(report.entries()[0].severity, Severity::Error);
