@@ -184,6 +184,7 @@ struct VectorCase {
 
 TEST(ProgramMath, EveryVectorModeMatchesItsFormula) {
     using V = glm::dvec3;
+    // NOLINTBEGIN(performance-unnecessary-value-param): formulas read best by value
     const std::vector<VectorCase> cases = {
         {VectorMathMode::Add, [](V a, V b, V, double) { return a + b; }},
         {VectorMathMode::Subtract, [](V a, V b, V, double) { return a - b; }},
@@ -220,6 +221,7 @@ TEST(ProgramMath, EveryVectorModeMatchesItsFormula) {
                       a.z < 0.0 ? 0.0 : std::pow(a.z, b.z));
          }},
     };
+    // NOLINTEND(performance-unnecessary-value-param)
     for (const VectorCase& vector : cases) {
         const OpCase test{
             NodeOpCode::VectorMath, static_cast<std::uint16_t>(vector.mode), {3, 3, 3, 1}, 3, {}};
