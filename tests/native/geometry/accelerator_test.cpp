@@ -128,6 +128,47 @@ TEST(Accelerator, CoherentRaysHitTheSame) {
     }
 }
 
+// Shadow rays in packets of any size say what the nearest hit says: on a closed surface, many of
+// them through its edges and corners, broken rays among them.
+TEST(Accelerator, ShadowRaysAgreeWithNearestHits) {
+    Random random(21);
+    TestGeometry scene;
+    scene.meshes.push_back(sphere_mesh("sphere", Vec3(0), 1.0f, 20, 30));
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    scene.instances.push_back(make_instance(0, random.affine(2.0f)));
+    scene.build();
+    const std::vector<Vec3>& corners = scene.meshes[0].positions;
+    std::vector<Ray> rays;
+    for (int i = 0; i < 20000; ++i) {
+        const Vec3& corner = corners[random.index(corners.size())];
+        const Vec3& other = corners[random.index(corners.size())];
+        const Vec3 origin = random.in_box(4.0f);
+        const Vec3 to = i % 3 == 0   ? corner
+                        : i % 3 == 1 ? glm::mix(corner, other, random.uniform())
+                                     : random.in_box(2.0f);
+        rays.push_back({origin, glm::normalize(to - origin)});
+        rays.back().t_max = random.uniform(0.0f, 6.0f);
+        if (i % 97 == 0) {
+            rays.back().origin.y = std::numeric_limits<float>::infinity();
+        }
+    }
+    const std::vector<Hit> nearest = scene.trace(rays, kVisibleShadow);
+    std::size_t stopped = 0;
+    for (const std::size_t size : {std::size_t{1}, std::size_t{7}, std::size_t{16}, rays.size()}) {
+        for (std::size_t begin = 0; begin < rays.size(); begin += size) {
+            const auto part = std::span(rays).subspan(begin, std::min(size, rays.size() - begin));
+            std::vector<std::uint8_t> occluded(part.size(), 2);
+            scene.accelerator->occluded(part, occluded);
+            for (std::size_t i = 0; i < part.size(); ++i) {
+                const bool hit = nearest[begin + i].instance != kNone;
+                ASSERT_EQ(occluded[i], hit ? 1 : 0) << "ray " << begin + i << " of " << size;
+                stopped += hit ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(stopped, rays.size());
+}
+
 TEST(Accelerator, BarycentricsGiveTheHitPoint) {
     Random random(2);
     TestGeometry scene;
