@@ -13,9 +13,13 @@ namespace {
 
 constexpr double kRecordsPerPass = 32768.0;
 // Hard scenes starve on that, few of their paths find the light: their records a vertex, and the
-// most of a pass.
-constexpr double kHardRecords = 0.4;
-constexpr double kMaxRecordsPerPass = 262144.0;
+// most of a pass. What is learned early serves all passes after it, what is learned late only few.
+constexpr double kMaxRecordsPerPass = 524288.0;
+
+[[nodiscard]] double hard_records(std::uint32_t pass) {
+    return pass < 8 ? 0.8 : pass < 20 ? 0.4 : 0.2;
+}
+
 // Where paths are quiet, learning takes no more than a few percent of a pass: records a vertex.
 constexpr double kEasyRecords = 0.06;
 constexpr float kFirstRecordProbability = 0.1f;
@@ -179,7 +183,7 @@ void GuideController::learn(RecordBuffer records,
         status_.moment_ratio = selected.moment_ratio;
         status_.closed = selected.closed && !hard_;
         if (hard_) {
-            wanted = std::clamp(kHardRecords * work.vertices, wanted, kMaxRecordsPerPass);
+            wanted = std::clamp(hard_records(pass_) * work.vertices, wanted, kMaxRecordsPerPass);
         } else if (pass_ > 0) {
             wanted = std::min(wanted, kEasyRecords * work.vertices);
         }
