@@ -1,7 +1,8 @@
-// Which lamps a ray may meet: a small bounding volume hierarchy over lamps with a surface, so that
-// thousands of them cost a ray about as much as a few.
+// Which lamps a ray may meet: a small bounding volume hierarchy over lamps with a surface, eight
+// boxes a node, so that thousands of them cost a ray about as much as a few.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -21,7 +22,7 @@ class LampTree {
     // are.
     explicit LampTree(std::span<const Lamp> lamps);
 
-    [[nodiscard]] bool empty() const { return nodes_.empty(); }
+    [[nodiscard]] bool empty() const { return order_.empty(); }
 
     struct Nearest {
         LampHit hit;
@@ -32,17 +33,25 @@ class LampTree {
                                                    const LightSampleContext* context) const;
 
   private:
-    struct Node {
-        Bounds3 bounds;
-        std::uint32_t first = 0;  // leaf: into order_; inner: its second child (the first follows)
-        std::uint32_t count = 0;  // 0: inner
+    static constexpr std::size_t kWidth = 8;
+    static constexpr std::uint32_t kLeaf = 0x80000000u;  // of a child: a lamp, else a node
+
+    struct alignas(32) Node {
+        // Lower x, y, z and upper x, y, z of each child's box; unused children have an empty one.
+        std::array<std::array<float, kWidth>, 6> planes{};
+        std::array<std::uint32_t, kWidth> children{};  // index, with kLeaf or without
     };
 
-    void build(std::uint32_t first, std::uint32_t count);
+    // Distance and direction of a ray as the boxes are tested against them.
+    struct Slabs;
+
+    std::uint32_t build(std::span<std::uint32_t> order);
+    void set_box(std::uint32_t node, std::size_t child, std::span<const std::uint32_t> order);
+    [[nodiscard]] static unsigned met_children(const Node& node, const Slabs& slabs, float t_max);
 
     std::span<const Lamp> lamps_;
-    std::vector<std::uint32_t> order_;
-    std::vector<Node> nodes_;
+    std::vector<std::uint32_t> order_;  // the lamps in the tree
+    std::vector<Node> nodes_;           // none for a few lamps: all of them are asked
 };
 
 }  // namespace pharos
