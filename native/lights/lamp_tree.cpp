@@ -5,13 +5,15 @@
 
 #include <immintrin.h>
 
+#include "core/check.h"
+
 namespace pharos {
 
 namespace {
 
 constexpr std::size_t kFewLamps = 4;
 // Halved ranges fill a stack of seven siblings a level.
-constexpr std::size_t kStackSize = 128;
+constexpr std::size_t kStackSize = 96;
 // Boxes are grown a little, because a flat one has no thickness to absorb rounding.
 constexpr float kGrown = 1e-5f;
 
@@ -102,6 +104,7 @@ void LampTree::set_box(std::uint32_t node,
     }
 }
 
+// A ray as the boxes are tested against it.
 struct LampTree::Slabs {
     struct Lanes {
         __m256 v;
@@ -143,37 +146,90 @@ unsigned LampTree::met_children(const Node& node, const Slabs& slabs, float t_ma
     return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(near, far, _CMP_LE_OQ)));
 }
 
+// How far one ray has come.
+struct LampTree::Search {
+    Ray rest;  // up to the nearest lamp so far
+    std::optional<Nearest> nearest;
+    Slabs slabs;
+    std::size_t waiting = 1;  // of the stack: the root
+    std::array<std::uint32_t, kStackSize> stack;
+
+    explicit Search(const Ray& ray) : rest(ray), slabs(ray) { stack[0] = 0; }
+};
+
+void LampTree::meet(std::uint32_t lamp, const LightSampleContext* context, Search& search) const {
+    if (const auto hit = hit_lamp(lamps_[lamp], search.rest, context)) {
+        search.rest.t_max = hit->t;
+        search.nearest = Nearest{*hit, lamp};
+    }
+}
+
+void LampTree::prefetch(std::uint32_t node) const {
+    const auto* first = reinterpret_cast<const char*>(&nodes_[node]);
+    for (std::size_t line = 0; line < sizeof(Node); line += 64) {
+        __builtin_prefetch(first + line);
+    }
+}
+
+// The last of the nodes that wait.
+void LampTree::visit_one(const LightSampleContext* context, Search& search) const {
+    const Node& node = nodes_[search.stack[--search.waiting]];
+    for (unsigned met = met_children(node, search.slabs, search.rest.t_max); met != 0;
+         met &= met - 1) {
+        const std::uint32_t child = node.children[static_cast<std::size_t>(std::countr_zero(met))];
+        if ((child & kLeaf) != 0) {
+            meet(child & ~kLeaf, context, search);
+        } else {
+            prefetch(child);
+            search.stack[search.waiting++] = child;
+        }
+    }
+}
+
 std::optional<LampTree::Nearest> LampTree::intersect(const Ray& ray,
                                                      const LightSampleContext* context) const {
     std::optional<Nearest> nearest;
-    Ray rest = ray;
-    const auto meet = [&](std::uint32_t lamp) {
-        if (const auto hit = hit_lamp(lamps_[lamp], rest, context)) {
-            rest.t_max = hit->t;
-            nearest = Nearest{*hit, lamp};
-        }
-    };
+    const LampRay one{ray, context};
+    intersect(std::span(&one, 1), std::span(&nearest, 1));
+    return nearest;
+}
+
+void LampTree::intersect(std::span<const LampRay> rays,
+                         std::span<std::optional<Nearest>> nearest) const {
     if (nodes_.empty()) {
-        std::ranges::for_each(order_, meet);
-        return nearest;
-    }
-    const Slabs slabs(ray);
-    std::array<std::uint32_t, kStackSize> stack;
-    std::size_t size = 0;
-    stack[size++] = 0;
-    while (size > 0) {
-        const Node& node = nodes_[stack[--size]];
-        for (unsigned met = met_children(node, slabs, rest.t_max); met != 0; met &= met - 1) {
-            const std::uint32_t child =
-                node.children[static_cast<std::size_t>(std::countr_zero(met))];
-            if ((child & kLeaf) != 0) {
-                meet(child & ~kLeaf);
-            } else {
-                stack[size++] = child;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            nearest[i].reset();
+            Ray rest = rays[i].ray;
+            for (const std::uint32_t lamp : order_) {
+                if (const auto hit = hit_lamp(lamps_[lamp], rest, rays[i].context)) {
+                    rest.t_max = hit->t;
+                    nearest[i] = Nearest{*hit, lamp};
+                }
             }
         }
+        return;
     }
-    return nearest;
+    DCHECK(rays.size() <= kTogether);
+    std::array<std::optional<Search>, kTogether> searches;
+    std::array<std::size_t, kTogether> under_way;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        searches[i].emplace(rays[i].ray);
+        under_way[i] = i;
+    }
+    for (std::size_t count = rays.size(); count > 0;) {
+        std::size_t kept = 0;
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t i = under_way[k];
+            visit_one(rays[i].context, *searches[i]);
+            if (searches[i]->waiting > 0) {
+                under_way[kept++] = i;
+            }
+        }
+        count = kept;
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        nearest[i] = searches[i]->nearest;
+    }
 }
 
 }  // namespace pharos

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lights/lamp.h"
+#include "lights/light_sampler.h"
 
 namespace pharos {
 
@@ -32,6 +33,10 @@ class LampTree {
     [[nodiscard]] std::optional<Nearest> intersect(const Ray& ray,
                                                    const LightSampleContext* context) const;
 
+    // Of up to kTogether rays, which go down together, so that none waits for memory.
+    static constexpr std::size_t kTogether = 16;
+    void intersect(std::span<const LampRay> rays, std::span<std::optional<Nearest>> nearest) const;
+
   private:
     static constexpr std::size_t kWidth = 8;
     static constexpr std::uint32_t kLeaf = 0x80000000u;  // of a child: a lamp, else a node
@@ -42,12 +47,15 @@ class LampTree {
         std::array<std::uint32_t, kWidth> children{};  // index, with kLeaf or without
     };
 
-    // Distance and direction of a ray as the boxes are tested against them.
     struct Slabs;
+    struct Search;
 
     std::uint32_t build(std::span<std::uint32_t> order);
     void set_box(std::uint32_t node, std::size_t child, std::span<const std::uint32_t> order);
+    void prefetch(std::uint32_t node) const;
+    void meet(std::uint32_t lamp, const LightSampleContext* context, Search& search) const;
     [[nodiscard]] static unsigned met_children(const Node& node, const Slabs& slabs, float t_max);
+    void visit_one(const LightSampleContext* context, Search& search) const;
 
     std::span<const Lamp> lamps_;
     std::vector<std::uint32_t> order_;  // the lamps in the tree

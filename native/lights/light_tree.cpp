@@ -233,26 +233,56 @@ void LightTree::estimate(const Node& node,
     }
 }
 
-std::optional<LightChoice> LightTree::choose(const LightSampleContext& context, double u) const {
-    double pmf = 1.0;
-    std::uint32_t index = kRoot;
-    while (true) {
-        const Node& node = nodes_[index];
-        LeanColumns::Column weights;
-        estimate(node, context, weights);
-        const Sums sums = sums_of(weights);
-        if (!(sums.back() > 0.0 && sums.back() < kLargestSum)) {
-            return std::nullopt;
+// One step down: the child, kNone where nothing arrives.
+std::uint32_t LightTree::choose_child(const LightSampleContext& context, Descent& at) const {
+    const Node& node = nodes_[at.node];
+    LeanColumns::Column weights;
+    estimate(node, context, weights);
+    const Sums sums = sums_of(weights);
+    if (!(sums.back() > 0.0 && sums.back() < kLargestSum)) {
+        return kNone;
+    }
+    const double place = at.u * sums.back();
+    const std::size_t entry = entry_at(weights, sums, place);
+    const double before = entry == 0 ? 0.0 : sums[entry - 1];
+    const auto weight = static_cast<double>(weights[entry]);
+    at.u = std::clamp((place - before) / weight, 0.0, 0x1.fffffffffffffp-1);
+    at.pmf *= weight / sums.back();
+    return node.children[entry];
+}
+
+void LightTree::prefetch(std::uint32_t node) const {
+    const auto* first = reinterpret_cast<const char*>(&nodes_[node]);
+    for (std::size_t line = 0; line < sizeof(Node); line += 64) {
+        __builtin_prefetch(first + line);
+    }
+}
+
+void LightTree::choose(std::span<LightQuery> queries) const {
+    constexpr std::size_t kTogether = 16;
+    for (std::size_t first = 0; first < queries.size(); first += kTogether) {
+        const auto part = queries.subspan(first, std::min(kTogether, queries.size() - first));
+        std::array<Descent, kTogether> ways;
+        std::array<std::size_t, kTogether> under_way;
+        for (std::size_t i = 0; i < part.size(); ++i) {
+            ways[i].u = part[i].u_choice;
+            part[i].choice = LightChoice{};
+            under_way[i] = i;
         }
-        const double at = u * sums.back();
-        const std::size_t entry = entry_at(weights, sums, at);
-        const double before = entry == 0 ? 0.0 : sums[entry - 1];
-        const auto weight = static_cast<double>(weights[entry]);
-        u = std::clamp((at - before) / weight, 0.0, 0x1.fffffffffffffp-1);
-        pmf *= weight / sums.back();
-        index = node.children[entry];
-        if ((index & kLeaf) != 0) {
-            return LightChoice{index & ~kLeaf, static_cast<float>(pmf), u};
+        for (std::size_t count = part.size(); count > 0;) {
+            std::size_t kept = 0;
+            for (std::size_t k = 0; k < count; ++k) {
+                const std::size_t i = under_way[k];
+                const std::uint32_t child = choose_child(part[i].context, ways[i]);
+                if (child != kNone && (child & kLeaf) == 0) {
+                    prefetch(child);
+                    ways[i].node = child;
+                    under_way[kept++] = i;
+                } else if (child != kNone) {
+                    part[i].choice = {child & ~kLeaf, static_cast<float>(ways[i].pmf), ways[i].u};
+                }
+            }
+            count = kept;
         }
     }
 }

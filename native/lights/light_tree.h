@@ -7,7 +7,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,13 +14,6 @@
 #include "lights/light_columns.h"
 
 namespace pharos {
-
-// Light `index` was chosen with probability `pmf`; `u` is what is left of the random number.
-struct LightChoice {
-    std::uint32_t group = 0;
-    float pmf = 0.0f;
-    double u = 0.0;
-};
 
 // One step: an entry in proportion to its weight, and the rest of u. sum > 0.
 [[nodiscard]] LightChoice choose_in_proportion(std::span<const float> weights, float sum, double u);
@@ -33,9 +25,9 @@ class LightTree {
 
     [[nodiscard]] bool empty() const { return nodes_.empty(); }
 
-    // nullopt: where it went nothing arrives.
-    [[nodiscard]] std::optional<LightChoice> choose(const LightSampleContext& context,
-                                                    double u) const;
+    // Answers all queries, pmf 0 where the way led to where nothing arrives. Some of them descend
+    // together, so that none waits for memory.
+    void choose(std::span<LightQuery> queries) const;
 
     [[nodiscard]] float pmf(const LightSampleContext& context, std::uint32_t light) const;
 
@@ -57,9 +49,18 @@ class LightTree {
         Slot parent;                 // of any but the root
     };
 
+    // A way down: the node it has come to.
+    struct Descent {
+        std::uint32_t node = kRoot;
+        double u = 0.0;
+        double pmf = 1.0;
+    };
+
     std::uint32_t build(std::span<const LightBound> bounds,
                         std::span<std::uint32_t> order,
                         Slot parent);
+    [[nodiscard]] std::uint32_t choose_child(const LightSampleContext& context, Descent& at) const;
+    void prefetch(std::uint32_t node) const;
     void set_bounds(Node& node, std::span<const LightBound> bounds);
     void estimate(const Node& node,
                   const LightSampleContext& context,

@@ -1,6 +1,4 @@
-// Ten thousand emitters against one: what a sample costs, and how long a million triangles take.
-#include <cmath>
-
+// Ten thousand emitters against one: what a sample costs.
 #include <gtest/gtest.h>
 
 #include "support/render.h"
@@ -15,6 +13,8 @@ constexpr float kHalfRoom = 4.0f;
 constexpr float kLampHeight = 2.9f;
 constexpr float kPower = 400.0f;  // of all together
 constexpr float kCovered = 0.2f;  // of a grid's step, by each emitter's side
+constexpr double kBar = 0.3;
+constexpr double kTolerated = 0.5;  // on machines whose caches others fill
 
 enum class Emitters : std::uint8_t { Lamps, Quads };
 
@@ -84,12 +84,15 @@ double cost_over_one(Emitters emitters) {
 
 TEST(ManyLights, LampsCostLittleMoreThanOne) {
     const double more = cost_over_one(Emitters::Lamps);
-    say_stress("10 000 lamps: CPU a sample over one's", kMany * kMany, more, 0.3);
+    say_stress("10 000 lamps: CPU of a sample over that with one", kMany * kMany, more, kBar);
+    EXPECT_LE(more, kTolerated);
 }
 
 TEST(ManyLights, QuadsCostLittleMoreThanOne) {
     const double more = cost_over_one(Emitters::Quads);
-    say_stress("10 000 emissive quads: CPU a sample over one's", kMany * kMany, more, 0.3);
+    say_stress(
+        "10 000 emissive quads: CPU of a sample over that with one", kMany * kMany, more, kBar);
+    EXPECT_LE(more, kTolerated);
 }
 
 }  // namespace
