@@ -93,9 +93,7 @@ TEST_P(Scale, RespawnedRaysNeverHitTheirOwnTriangle) {
 // Of less than a tenth of a millimetre the distance along the ray has few digits.
 class PointScale : public Scale {};
 
-INSTANTIATE_TEST_SUITE_P(Coordinates,
-                         PointScale,
-                         ::testing::Values(1e-4f, 1.0f, 1e3f, 1e6f, 1e8f));
+INSTANTIATE_TEST_SUITE_P(Coordinates, PointScale, ::testing::Values(1e-4f, 1.0f, 1e3f, 1e6f, 1e8f));
 
 // The computed point against the same point in double, and a bound that is not absurd.
 TEST_P(PointScale, PointLiesWithinItsErrorBound) {
