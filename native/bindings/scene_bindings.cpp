@@ -11,7 +11,6 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/casters.h"
-#include "scene/displace.h"
 #include "scene/dump.h"
 #include "scene/scene_description.h"
 
@@ -349,7 +348,6 @@ void bind_scene(py::module_& m) {
             "copy", [](const SceneDescription& s) { return SceneDescription(s); }, FreeGuard());
 
     m.attr("DISPLACE_IN_WORLD") = static_cast<int>(kDisplaceInWorld);
-    m.attr("DISPLACE_IN_TANGENT_SPACE") = static_cast<int>(kDisplaceInTangentSpace);
     m.def("write_dump", &write_dump, FreeGuard(), py::arg("description"), py::arg("path"));
     m.def("read_dump", &read_dump, FreeGuard(), py::arg("path"));
 }

@@ -1,10 +1,8 @@
 #include "scene/displace.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <map>
-#include <optional>
 #include <utility>
 
 namespace pharos {
@@ -37,62 +35,6 @@ constexpr float kFlat = 0.9999f;  // cosine of a corner's normal to its face's
     return mesh.normal_domain == NormalDomain::Vertex ? mesh.normals : mean_normals(mesh);
 }
 
-struct Tangent {
-    Vec3 along;         // growing u, at right angles to the normal
-    float side = 1.0f;  // of the bitangent: -1 where the coordinates are mirrored
-};
-
-// At each vertex, in the object's space: the mean of the faces around it, weighed by their angles
-// there, of those that are mirrored as the first of them is (Mikkelsen 2008). Without coordinates
-// u grows along each triangle's first edge.
-class TangentSum {
-  public:
-    TangentSum(const Mesh& mesh, const std::vector<Vec3>& normals)
-        : mesh_(mesh), normals_(normals), sums_(mesh.positions.size()) {
-        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-            add(i);
-        }
-    }
-
-    [[nodiscard]] Tangent at(std::uint32_t vertex) const {
-        const Tangent& sum = sums_[vertex];
-        return {normalize_or(sum.along, Vec3(0.0f)), sum.side};
-    }
-
-  private:
-    void add(std::size_t triangle) {
-        const UVec3& t = mesh_.triangles[triangle];
-        const Vec3 p1 = mesh_.positions[t.y] - mesh_.positions[t.x];
-        const Vec3 p2 = mesh_.positions[t.z] - mesh_.positions[t.x];
-        Vec3 along = p1;
-        float side = 1.0f;
-        if (!mesh_.uv_maps.empty()) {
-            const Vec2* uv = &mesh_.uv_maps.front().uv[3 * triangle];
-            const Vec2 d1 = uv[1] - uv[0];
-            const Vec2 d2 = uv[2] - uv[0];
-            side = d1.x * d2.y - d2.x * d1.y < 0.0f ? -1.0f : 1.0f;
-            along = (p1 * d2.y - p2 * d1.y) * side;
-        }
-        for (int k = 0; k < 3; ++k) {
-            const Vec3 corner = mesh_.positions[t[k]];
-            const Vec3 a = normalize_or(mesh_.positions[t[(k + 1) % 3]] - corner, Vec3(0.0f));
-            const Vec3 b = normalize_or(mesh_.positions[t[(k + 2) % 3]] - corner, Vec3(0.0f));
-            const float angle = std::acos(std::clamp(glm::dot(a, b), -1.0f, 1.0f));
-            const Vec3& n = normals_[t[k]];
-            const Vec3 flat = normalize_or(along - n * glm::dot(along, n), Vec3(0.0f));
-            Tangent& sum = sums_[t[k]];
-            if (is_zero(sum.along)) {
-                sum.side = side;
-            }
-            sum.along += sum.side == side ? flat * angle : Vec3(0.0f);
-        }
-    }
-
-    const Mesh& mesh_;
-    const std::vector<Vec3>& normals_;
-    std::vector<Tangent> sums_;
-};
-
 // Which corners are shaded flat, before vertices move.
 [[nodiscard]] std::vector<std::uint8_t> flat_corners(const Mesh& mesh) {
     std::vector<std::uint8_t> flat;
@@ -124,19 +66,7 @@ void renew_normals(Mesh& mesh, const std::vector<std::uint8_t>& flat) {
 struct Vertices {
     std::vector<std::uint32_t> index;
     std::vector<SurfaceInteraction> hits;
-    std::vector<Tangent> tangents;  // where the material asks
 };
-
-[[nodiscard]] bool asks_tangents(const Material& material) {
-    return std::ranges::any_of(material.aovs.closures,
-                               [](const NodeOp& op) { return op.mode == kDisplaceInTangentSpace; });
-}
-
-// Of a vertex, from the space of its tangent to the object's; n is the object's, too.
-[[nodiscard]] Vec3 along_tangent(const Vec3& offset, const Tangent& tangent, const Vec3& n) {
-    const Vec3 across = glm::cross(n, tangent.along) * tangent.side;
-    return tangent.along * offset.x + n * offset.y + across * offset.z;
-}
 
 class Displacer {
   public:
@@ -169,7 +99,6 @@ bool Displacer::moves(const Instance& instance) const {
 std::map<std::uint32_t, Vertices> Displacer::collect(std::uint32_t number, const Mesh& mesh) const {
     const Instance& instance = scene_.instances[number];
     const std::vector<Vec3> normals = smooth_normals(mesh);
-    std::optional<TangentSum> tangents;
     std::vector<bool> done(mesh.positions.size());
     std::map<std::uint32_t, Vertices> by_material;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -180,10 +109,6 @@ std::map<std::uint32_t, Vertices> Displacer::collect(std::uint32_t number, const
             continue;
         }
         Vertices& vertices = by_material[material];
-        const bool with_tangents = asks_tangents(scene_.displacements[material]);
-        if (with_tangents && !tangents) {
-            tangents.emplace(mesh, normals);
-        }
         for (int k = 0; k < 3; ++k) {
             const std::uint32_t vertex = mesh.triangles[i][k];
             if (done[vertex]) {
@@ -202,9 +127,6 @@ std::map<std::uint32_t, Vertices> Displacer::collect(std::uint32_t number, const
             hit.material = material;
             vertices.index.push_back(vertex);
             vertices.hits.push_back(hit);
-            if (with_tangents) {
-                vertices.tangents.push_back(tangents->at(vertex));
-            }
         }
     }
     return by_material;
@@ -222,15 +144,11 @@ void Displacer::move(const Vertices& vertices,
         const bool in_world = op.mode == kDisplaceInWorld;
         for (std::size_t i = 0; i < count; ++i) {
             Vec3 offset = values[k * count + i];
-            const Vec3& n = vertices.hits[i].ns;
-            // Normals go to the object's space by the transposed matrix.
-            const auto object_n = [&] {
-                return normalize_or(glm::transpose(Mat3(instance.to_world)) * n, n);
-            };
             if (op.code == NodeOpCode::AovValue) {
-                offset *= in_world ? n : object_n();
-            } else if (op.mode == kDisplaceInTangentSpace) {
-                offset = along_tangent(offset, vertices.tangents[i], object_n());
+                const Vec3& n = vertices.hits[i].ns;
+                // Normals go to the object's space by the transposed matrix.
+                offset *=
+                    in_world ? n : normalize_or(glm::transpose(Mat3(instance.to_world)) * n, n);
             }
             if (in_world) {
                 offset = transform_vector(instance.to_object, offset);

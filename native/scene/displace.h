@@ -2,16 +2,10 @@
 // to scene/).
 #pragma once
 
-#include <cstdint>
-
 #include "core/cancel.h"
 #include "scene/scene.h"
 
 namespace pharos {
-
-// Beside kDisplaceInWorld: along the tangent of the first texture coordinates, the normal and what
-// is across both.
-inline constexpr std::uint16_t kDisplaceInTangentSpace = 2;
 
 // Textures, materials and the shading context are ready. Meshes that stand with several sets of
 // materials are copied for each. True when some mesh has changed: what refers to meshes is to be

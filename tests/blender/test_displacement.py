@@ -112,8 +112,6 @@ def test_vertices_go_where_cycles_moves_them():
             _compare(f"height {space} smooth {smooth}", 0.03)
             _scene("DISPLACEMENT", smooth, _vectors, space, 64)
             _compare(f"vector {space} smooth {smooth}", 0.03)
-        _scene("DISPLACEMENT", smooth, _vectors, "TANGENT", 64)
-        _compare(f"vector TANGENT smooth {smooth}", 0.03)
 
 
 def test_displacement_with_bump():
@@ -122,6 +120,13 @@ def test_displacement_with_bump():
     from pharos.export.nodes import NO_BUMP_BESIDE_DISPLACEMENT
 
     _compare("both", 0.4, [f"Material: {NO_BUMP_BESIDE_DISPLACEMENT}"])
+
+
+def test_what_is_not_moved_is_named():
+    _scene("DISPLACEMENT", True, _vectors, "TANGENT", 1)
+    harness.render()
+    bpy.context.scene.pharos.follow_cycles = False
+    assert len(harness.report()) == 1 and "tangent space" in harness.report()[0], harness.report()
 
 
 def test_shared_meshes_move_once_for_each_set_of_materials():

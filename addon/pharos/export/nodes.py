@@ -236,10 +236,11 @@ def flatten_material(native, images, report, material, aovs=()) -> Flattened:
 
 
 def _vector_moved(f, node, scope):
-    """The vector of a Vector Displacement node, in the space it names."""
-    program = f.program
+    """The vector of a Vector Displacement node; None in tangent space."""
     if node.space == "TANGENT":
-        program.reads_uv = True  # tangents follow the map that is rendered by default
+        f.unsupported(node, "displacement in tangent space")
+        return None
+    program = f.program
     middle = program.to_vector(f.input(node, scope, "Midlevel", 1))
     above = program.vector_math("Subtract", f.input(node, scope, "Vector", 3), middle)
     scale = program.to_vector(f.input(node, scope, "Scale", 1))
@@ -270,8 +271,8 @@ def flatten_displacement(native, images, report, material) -> Flattened | None:
         return None
     if compat.displacement_method(material) == "BOTH":
         flattener.warn(NO_BUMP_BESIDE_DISPLACEMENT)
-    modes = {"WORLD": native.DISPLACE_IN_WORLD, "TANGENT": native.DISPLACE_IN_TANGENT_SPACE}
-    flattener.program.closure(code, [value], modes.get(node.space, 0))
+    mode = native.DISPLACE_IN_WORLD if node.space == "WORLD" else 0
+    flattener.program.closure(code, [value], mode)
     return flattener.result()
 
 
