@@ -23,6 +23,7 @@ LOGS = ROOT / "build" / "stress"
 FUZZERS = ("dump", "scene", "program", "image", "state")
 NUMBERS = {
     "film": "Film.AMillion*",
+    "geometry": "*Scale.*:Watertight.*",
     "camera": "Camera.Any*",
     "image": "Texture.Any*",
     "lights": "Lights.Any*",
@@ -85,6 +86,11 @@ def kills(table: Table) -> None:
 
 def sizes(table: Table) -> None:
     gtest(table, "sizes", "session", "LargeScenes.*", PHAROS_LONG_TESTS="1")
+
+
+def many(table: Table) -> None:
+    gtest(table, "many", "lights", "ManyLights.*")
+    gtest(table, "many", "session", "ManyLights.*")
 
 
 def cancel(table: Table) -> None:
@@ -346,7 +352,8 @@ def fuzz(table: Table, seconds: int) -> None:
                   int(done.returncode != 0), 0)
 
 
-ATTACKS = {f.__name__: f for f in (numbers, kills, sizes, cancel, soak, memory, exits, scenes)}
+ATTACKS = {f.__name__: f for f in (numbers, kills, sizes, many, cancel, soak, memory, exits,
+                                   scenes)}
 
 
 def main() -> int:

@@ -40,11 +40,15 @@ bool is_closed(std::span<const UVec3> triangles) {
            std::adjacent_find(forward.begin(), forward.end()) == forward.end();
 }
 
+float area_of(const Vec3& e1, const Vec3& e2) {
+    return 0.5f * glm::length(glm::cross(e1, e2));
+}
+
 std::uint32_t material_of(const Mesh& mesh, const Instance& instance, std::uint32_t triangle) {
-    if (mesh.material_indices.empty() || instance.materials.empty()) {
+    if (instance.materials.empty()) {
         return 0;
     }
-    const std::size_t slot = mesh.material_indices[triangle];
+    const std::size_t slot = mesh.material_indices.empty() ? 0 : mesh.material_indices[triangle];
     return instance.materials[std::min(slot, instance.materials.size() - 1)];
 }
 
@@ -92,9 +96,9 @@ void EmissiveTriangles::collect(const LightSamplerInput& input) {
         t.e2 = transform_point(instance.to_world, mesh.positions[corner.z]) - t.p0;
         t.instance = emitter.instance;
         t.triangle = emitter.triangle;
-        t.area = 0.5f * glm::length(glm::cross(t.e1, t.e2));
-        t.weight = t.area * average(glm::abs(emitter.L_estimate));
-        if (!(t.weight > 0.0f && t.weight < kInfinity && t.area > 1e-30f)) {
+        const float area = area_of(t.e1, t.e2);
+        t.weight = area * average(glm::abs(emitter.L_estimate));
+        if (!(t.weight > 0.0f && t.weight < kInfinity && area > 1e-30f)) {
             continue;
         }
         const std::uint32_t material = material_of(mesh, instance, emitter.triangle);
@@ -102,6 +106,7 @@ void EmissiveTriangles::collect(const LightSamplerInput& input) {
         const auto [it, added] = group_of.try_emplace(key, group_count());
         if (added) {
             groups_.emplace_back();
+            groups_.back().material = material;
         }
         t.group = it->second;
         ++groups_[t.group].count;
@@ -125,7 +130,7 @@ void EmissiveTriangles::finish_group(Group& group) {
     const Vec3 first_normal = unit_normal(triangles_[group.first].e1, triangles_[group.first].e2);
     bool flat = !is_zero(first_normal);
     for (const Triangle& t : members(group)) {
-        area_sum += static_cast<double>(t.area);
+        area_sum += static_cast<double>(area_of(t.e1, t.e2));
         power_sum += static_cast<double>(t.weight);
         weights.push_back(t.weight);
         group.bounds.extend(t.p0);
@@ -137,7 +142,10 @@ void EmissiveTriangles::finish_group(Group& group) {
     group.power = static_cast<float>(power_sum);
     group.normal = flat ? first_normal : Vec3(0.0f);
     group.center = group.bounds.center();
-    group.choice = AliasTable(weights);
+    const AliasTable choice(weights);
+    for (std::uint32_t i = 0; i < group.count; ++i) {
+        triangles_[group.first + i].choice = choice.slot(i);
+    }
 }
 
 bool EmissiveTriangles::is_closed_group(const LightSamplerInput& input, const Group& group) const {
@@ -161,7 +169,7 @@ void EmissiveTriangles::split_groups(const LightSamplerInput& input) {
             groups_.push_back(group);
             groups_.back().closed = closed;
         } else {
-            split_range(group.first, group.count);
+            split_range(group.first, group.count, group.material);
         }
     }
     for (std::uint32_t index = 0; index < groups_.size(); ++index) {
@@ -172,11 +180,14 @@ void EmissiveTriangles::split_groups(const LightSamplerInput& input) {
 }
 
 // Halves along the longest axis until a cluster is left; reorders the triangles.
-void EmissiveTriangles::split_range(std::uint32_t first, std::uint32_t count) {
+void EmissiveTriangles::split_range(std::uint32_t first,
+                                    std::uint32_t count,
+                                    std::uint32_t material) {
     if (count <= kClusterTriangles) {
         Group cluster;
         cluster.first = first;
         cluster.count = count;
+        cluster.material = material;
         groups_.push_back(std::move(cluster));
         return;
     }
@@ -196,8 +207,8 @@ void EmissiveTriangles::split_range(std::uint32_t first, std::uint32_t count) {
         return x != y ? x < y
                       : std::pair(a.instance, a.triangle) < std::pair(b.instance, b.triangle);
     });
-    split_range(first, half);
-    split_range(first + half, count - half);
+    split_range(first, half, material);
+    split_range(first + half, count - half, material);
 }
 
 void EmissiveTriangles::add_facing_tables(Group& group) {
@@ -219,10 +230,16 @@ void EmissiveTriangles::add_facing_tables(Group& group) {
     group.facing_distance2 = sqr(kFacingDistance) * length_squared(0.5f * group.bounds.extent());
 }
 
-const AliasTable& EmissiveTriangles::choice_from(const Group& group, const Vec3& p) const {
+const AliasTable* EmissiveTriangles::facing_table(const Group& group, const Vec3& p) {
     const Vec3 direction = p - group.center;
     const bool far = length_squared(direction) > group.facing_distance2;
-    return far ? group.facing.towards(direction) : group.choice;
+    return far ? &group.facing.towards(direction) : nullptr;
+}
+
+void EmissiveTriangles::prefetch(std::uint32_t group_index, double u_choice) const {
+    const Group& group = groups_[group_index];
+    const auto place = static_cast<std::uint32_t>(u_choice * static_cast<double>(group.count));
+    __builtin_prefetch(&triangles_[group.first + place]);
 }
 
 LightBound EmissiveTriangles::bound(std::uint32_t index) const {
@@ -247,7 +264,13 @@ std::optional<EmissiveTriangles::Sample> EmissiveTriangles::sample(std::uint32_t
                                                                    double u_choice,
                                                                    const Vec2& u) const {
     const Group& group = groups_[group_index];
-    const AliasTable::Sample chosen = choice_from(group, p).sample(u_choice);
+    const AliasTable* facing = facing_table(group, p);
+    const AliasTable::Sample chosen =
+        facing != nullptr
+            ? facing->sample(u_choice)
+            : sample_alias(u_choice, group.count, [&](std::size_t i) -> const AliasSlot& {
+                  return triangles_[group.first + i].choice;
+              });
     const Triangle& t = triangles_[group.first + chosen.index];
     const Vec2 b = sample_uniform_triangle(u);
     const Vec3 to_light = t.p0 + t.e1 * b.x + t.e2 * b.y - p;
@@ -260,6 +283,7 @@ std::optional<EmissiveTriangles::Sample> EmissiveTriangles::sample(std::uint32_t
     sample.pdf = chosen.pmf * distance2 / projected;
     sample.instance = t.instance;
     sample.triangle = t.triangle;
+    sample.material = group.material;
     sample.u = b.x;
     sample.v = b.y;
     const bool usable = sample.pdf > 0.0f && sample.pdf < kInfinity;
@@ -282,7 +306,9 @@ float EmissiveTriangles::pdf_area(std::uint32_t instance,
     }
     const Triangle& t = triangles_[index];
     const Group& group = groups_[t.group];
-    return choice_from(group, p).pmf(index - group.first) / t.area;
+    const AliasTable* facing = facing_table(group, p);
+    const float pmf = facing != nullptr ? facing->pmf(index - group.first) : t.choice.pmf;
+    return pmf / area_of(t.e1, t.e2);
 }
 
 }  // namespace pharos

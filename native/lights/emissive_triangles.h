@@ -36,6 +36,7 @@ class EmissiveTriangles {
         float pdf = 0.0f;  // solid angle, choice within the group included
         std::uint32_t instance = kNone;
         std::uint32_t triangle = kNone;
+        std::uint32_t material = kNone;
         float u = 0.0f;
         float v = 0.0f;
     };
@@ -45,6 +46,9 @@ class EmissiveTriangles {
                                                const Vec3& p,
                                                double u_choice,
                                                const Vec2& u) const;
+
+    // What sample() will ask for first, brought near ahead of time.
+    void prefetch(std::uint32_t group, double u_choice) const;
 
     // The group that samples a triangle; kNone: not sampled.
     [[nodiscard]] std::uint32_t find_group(std::uint32_t instance, std::uint32_t triangle) const {
@@ -59,34 +63,37 @@ class EmissiveTriangles {
                                  const Vec3& p) const;
 
   private:
-    struct Triangle {
+    struct alignas(64) Triangle {
         Vec3 p0;
         Vec3 e1;
         Vec3 e2;
-        float area = 0.0f;
         float weight = 0.0f;  // area times radiance
         std::uint32_t instance = 0;
         std::uint32_t triangle = 0;
         std::uint32_t group = 0;
+        AliasTable::Slot choice;  // within its group
     };
 
-    struct Group {
+    static_assert(sizeof(Triangle) == 64);
+
+    // What sampling asks for comes first.
+    struct alignas(64) Group {
         std::uint32_t first = 0;
         std::uint32_t count = 0;
-        Bounds3 bounds;
+        std::uint32_t material = kNone;
+        float facing_distance2 = kInfinity;  // from which on the facing tables hold
+        Vec3 center;
+        Vec3 normal;  // of a flat group, else zero
         float area = 0.0f;
         float power = 0.0f;  // radiance times area
-        Vec3 normal;         // of a flat group, else zero
-        Vec3 center;
-        float facing_distance2 = kInfinity;  // from which on the facing tables hold
-        AliasTable choice;
         bool closed = false;
+        Bounds3 bounds;
         FacingTables facing;  // of a closed group, if there are not too many
     };
 
     void collect(const LightSamplerInput& input);
     void split_groups(const LightSamplerInput& input);
-    void split_range(std::uint32_t first, std::uint32_t count);
+    void split_range(std::uint32_t first, std::uint32_t count, std::uint32_t material);
     void finish_group(Group& group);
     [[nodiscard]] bool is_closed_group(const LightSamplerInput& input, const Group& group) const;
     void add_facing_tables(Group& group);
@@ -95,7 +102,8 @@ class EmissiveTriangles {
         return std::span(triangles_).subspan(group.first, group.count);
     }
 
-    [[nodiscard]] const AliasTable& choice_from(const Group& group, const Vec3& p) const;
+    // The table of a closed group seen from afar; null: the triangles' own choice holds.
+    [[nodiscard]] static const AliasTable* facing_table(const Group& group, const Vec3& p);
     [[nodiscard]] std::uint32_t find(std::uint32_t instance, std::uint32_t triangle) const;
 
     std::vector<Triangle> triangles_;

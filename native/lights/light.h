@@ -20,6 +20,22 @@ struct LightSampleContext {
     bool transmits = false;  // the surface also receives light from behind n
 };
 
+// Light `group` was chosen with probability `pmf`; `u` is what is left of the random number. pmf 0:
+// nothing arrives.
+struct LightChoice {
+    std::uint32_t group = 0;
+    float pmf = 0.0f;
+    double u = 0.0;
+};
+
+// A receiver that asks for a light; `u` is what is left for a point on it.
+struct LightQuery {
+    LightSampleContext context;
+    double u_choice = 0.0;
+    Vec2 u;
+    LightChoice choice;
+};
+
 struct LightSample {
     Rgb L{0.0f};
     Vec3 wi;  // unit, from the context point to the light

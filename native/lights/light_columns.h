@@ -23,6 +23,11 @@ namespace detail {
 inline constexpr float kMinReceiverCosine = 0.02f;
 inline constexpr float kMinConeFactor = 0.05f;
 
+// Irradiance does not exceed pi times the radiance, strength / area.
+inline float least_distance2(const LightBound& bound) {
+    return std::max(bound.area * kInvPi, 1e-20f);
+}
+
 // Largest cosine between an axis and any direction within a cone of half angle asin(sin_bound)
 // around a direction at `cosine` to the axis.
 inline float widest_cosine(float cosine, float sin_bound) {
@@ -58,8 +63,7 @@ class LightColumns {
         local_[i] = bound.distance == EmitterDistance::Local ? 1.0f : 0.0f;
         strength_[i] = bound.strength;
         radius_[i] = bound.radius;
-        // Irradiance does not exceed pi times the radiance, strength / area.
-        min_distance2_[i] = std::max(bound.area * kInvPi, 1e-20f);
+        min_distance2_[i] = least_distance2(bound);
         min_received_[i] = bound.distance == EmitterDistance::Ambient ? 1.0f : kMinReceiverCosine;
         mirror_[i] = bound.orientation == EmitterOrientation::TwoSided ? -1.0f : 1.0f;
         cutoff_[i] = bound.orientation == EmitterOrientation::Front ? 0.0f : -2.0f;

@@ -1,5 +1,8 @@
 #include "lights/light_sampler.h"
 
+#include <algorithm>
+#include <array>
+
 #include "core/color.h"
 #include "lights/emissive_triangles.h"
 #include "lights/lamp.h"
@@ -20,6 +23,13 @@ constexpr float kFaintest = 0.05f;
 bool is_worth_sampling(const EnvironmentLight* environment, bool has_portals) {
     return environment != nullptr && (has_portals || !environment->is_constant()) &&
            average(glm::abs(environment->mean_radiance())) > 0.0f;
+}
+
+void prefetch(const Lamp& lamp) {
+    const auto* first = reinterpret_cast<const char*>(&lamp);
+    for (std::size_t line = 0; line < sizeof(Lamp); line += 64) {
+        __builtin_prefetch(first + line);
+    }
 }
 
 LightBound bound_environment(const EnvironmentLight& environment) {
@@ -133,26 +143,48 @@ bool LightSampler::empty() const {
     return impl_->selection.empty();
 }
 
+void LightSampler::choose(std::span<LightQuery> queries) const {
+    const Impl& impl = *impl_;
+    impl.selection.choose(queries);
+    if (impl.selection.size() <= LightSelection::kMaxEstimated) {
+        return;
+    }
+    for (const LightQuery& query : queries) {
+        const LightChoice& choice = query.choice;
+        if (choice.group < impl.lamp_count()) {
+            prefetch(impl.lamps[choice.group]);
+        } else if (choice.group < impl.environment_group()) {
+            impl.triangles.prefetch(choice.group - impl.lamp_count(), choice.u);
+        }
+    }
+}
+
 std::optional<LightSamplerSample> LightSampler::sample(const LightSampleContext& context,
                                                        float u_choice,
                                                        const Vec2& u) const {
+    if (impl_->selection.empty()) {
+        return std::nullopt;
+    }
+    LightQuery query{context, widen_random(u_choice, u), u, {}};
+    impl_->selection.choose(std::span(&query, 1));
+    return sample(query);
+}
+
+std::optional<LightSamplerSample> LightSampler::sample(const LightQuery& query) const {
     const Impl& impl = *impl_;
-    if (impl.selection.empty()) {
+    const auto& [context, u_choice, u, choice] = query;
+    if (!(choice.pmf > 0.0f)) {
         return std::nullopt;
     }
-    const auto choice = impl.selection.choose(context, widen_random(u_choice, u));
-    if (!choice || !(choice->pmf > 0.0f)) {
-        return std::nullopt;
-    }
-    if (choice->group < impl.lamp_count()) {
-        auto result = impl.sample_lamp_group(context, choice->group, u);
+    if (choice.group < impl.lamp_count()) {
+        auto result = impl.sample_lamp_group(context, choice.group, u);
         if (result) {
-            result->sample.pdf *= choice->pmf;
+            result->sample.pdf *= choice.pmf;
         }
         return result;
     }
     LightSamplerSample result;
-    if (choice->group == impl.environment_group()) {
+    if (choice.group == impl.environment_group()) {
         const EnvironmentLight::Sample sample =
             impl.portals.empty() ? impl.environment->sample(u)
                                  : impl.portals.sample(*impl.environment, context, u);
@@ -160,19 +192,20 @@ std::optional<LightSamplerSample> LightSampler::sample(const LightSampleContext&
             return std::nullopt;
         }
         result.sample.wi = sample.wi;
-        result.sample.pdf = sample.pdf * choice->pmf;
+        result.sample.pdf = sample.pdf * choice.pmf;
         result.sample.distance = kInfinity;
         result.environment = true;
         return result;
     }
     const auto sample =
-        impl.triangles.sample(choice->group - impl.lamp_count(), context.p, choice->u, u);
+        impl.triangles.sample(choice.group - impl.lamp_count(), context.p, choice.u, u);
     if (!sample) {
         return std::nullopt;
     }
     result.sample.wi = sample->wi;
-    result.sample.pdf = sample->pdf * choice->pmf;
+    result.sample.pdf = sample->pdf * choice.pmf;
     result.sample.distance = sample->distance;
+    result.material = sample->material;
     result.instance = sample->instance;
     result.triangle = sample->triangle;
     result.u = sample->u;
@@ -187,6 +220,22 @@ std::optional<LightHit> LightSampler::intersect_lamps(const Ray& ray,
         return std::nullopt;
     }
     return impl_->finish_hit(nearest->hit, nearest->lamp, context);
+}
+
+void LightSampler::intersect_lamps(std::span<const LampRay> rays,
+                                   std::span<std::optional<LightHit>> hits) const {
+    std::array<std::optional<LampTree::Nearest>, LampTree::kTogether> nearest;
+    for (std::size_t first = 0; first < rays.size(); first += nearest.size()) {
+        const auto part = rays.subspan(first, std::min(nearest.size(), rays.size() - first));
+        impl_->tree.intersect(part, nearest);
+        for (std::size_t i = 0; i < part.size(); ++i) {
+            hits[first + i].reset();
+            if (nearest[i]) {
+                hits[first + i] =
+                    impl_->finish_hit(nearest[i]->hit, nearest[i]->lamp, part[i].context);
+            }
+        }
+    }
 }
 
 bool LightSampler::has_hittable_lamps() const {

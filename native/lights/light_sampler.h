@@ -43,10 +43,17 @@ struct LightSamplerSample {
     bool environment = false;
     std::uint32_t instance = 0xffffffffu;  // of the emissive triangle, else kNone
     std::uint32_t triangle = 0xffffffffu;
-    float u = 0.0f;  // barycentrics on it
+    std::uint32_t material = 0xffffffffu;  // its material
+    float u = 0.0f;                        // barycentrics on it
     float v = 0.0f;
     std::uint32_t lamp = 0;               // for lamp_point()
     std::uint32_t program = 0xffffffffu;  // of the lamp: what it emits multiplies L
+};
+
+// A ray that may meet lamps; `context` as in intersect_lamps().
+struct LampRay {
+    Ray ray;
+    const LightSampleContext* context = nullptr;
 };
 
 class LightSampler {
@@ -57,6 +64,13 @@ class LightSampler {
 
     [[nodiscard]] bool empty() const;  // nothing to sample: next-event estimation is skipped
 
+    // Chooses a light for each query; some receivers at once cost less than one by one.
+    void choose(std::span<LightQuery> queries) const;
+
+    // Samples the chosen light; nullopt where nothing arrives.
+    [[nodiscard]] std::optional<LightSamplerSample> sample(const LightQuery& query) const;
+
+    // Both for one receiver.
     [[nodiscard]] std::optional<LightSamplerSample> sample(const LightSampleContext& context,
                                                            float u_choice,
                                                            const Vec2& u) const;
@@ -65,6 +79,10 @@ class LightSampler {
     // that a BSDF or camera ray may hit; `context` is null for camera rays (pdf 0).
     [[nodiscard]] std::optional<LightHit> intersect_lamps(const Ray& ray,
                                                           const LightSampleContext* context) const;
+
+    // The same of several rays at once, which costs less.
+    void intersect_lamps(std::span<const LampRay> rays,
+                         std::span<std::optional<LightHit>> hits) const;
     [[nodiscard]] bool has_hittable_lamps() const;
 
     // Suns with an angle seen by an escaped ray (each one's radiance along wi and NEE density).

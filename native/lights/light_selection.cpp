@@ -13,20 +13,23 @@ LightSelection::LightSelection(std::span<const LightBound> bounds)
     }
 }
 
-std::optional<LightChoice> LightSelection::choose(const LightSampleContext& context,
-                                                  double u) const {
-    if (count_ == 1) {
-        return LightChoice{0, 1.0f, u};
-    }
+void LightSelection::choose(std::span<LightQuery> queries) const {
     if (!tree_.empty()) {
-        return tree_.choose(context, u);
+        tree_.choose(queries);
+        return;
     }
-    LightColumns<kMaxEstimated>::Column weights;
-    const float sum = columns_.estimate(context, count_, weights);
-    if (!(sum > 0.0f && sum < kInfinity)) {
-        return std::nullopt;
+    for (LightQuery& query : queries) {
+        query.choice = LightChoice{0, 1.0f, query.u_choice};
+        if (count_ == 1) {
+            continue;
+        }
+        LightColumns<kMaxEstimated>::Column weights;
+        const float sum = columns_.estimate(query.context, count_, weights);
+        query.choice =
+            sum > 0.0f && sum < kInfinity
+                ? choose_in_proportion(std::span(weights).first(count_), sum, query.u_choice)
+                : LightChoice{};
     }
-    return choose_in_proportion(std::span(weights).first(count_), sum, u);
 }
 
 float LightSelection::pmf(const LightSampleContext& context, std::uint32_t group) const {

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "lights/light_columns.h"
@@ -26,9 +25,7 @@ class LightSelection {
 
     [[nodiscard]] std::uint32_t size() const { return count_; }
 
-    // nullopt: nothing arrives.
-    [[nodiscard]] std::optional<LightChoice> choose(const LightSampleContext& context,
-                                                    double u) const;
+    void choose(std::span<LightQuery> queries) const;
 
     [[nodiscard]] float pmf(const LightSampleContext& context, std::uint32_t group) const;
 

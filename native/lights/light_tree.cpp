@@ -1,6 +1,7 @@
 #include "lights/light_tree.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 namespace pharos {
@@ -76,6 +77,15 @@ std::size_t best_split(std::span<const LightBound> bounds, Order order, const Bi
     return best;
 }
 
+std::vector<LightBound> members_of(std::span<const LightBound> bounds, Order order) {
+    std::vector<LightBound> members;
+    members.reserve(order.size());
+    for (const std::uint32_t i : order) {
+        members.push_back(bounds[i]);
+    }
+    return members;
+}
+
 // Reorders; both parts have one light at least.
 std::size_t split(std::span<const LightBound> bounds, Order order) {
     const Binning binning(box_of(bounds, order));
@@ -90,6 +100,37 @@ std::size_t split(std::span<const LightBound> bounds, Order order) {
         }
     }
     return order.size() / 2;
+}
+
+// Weights are floats: a sum beyond has one among them that is not finite.
+constexpr double kLargestSum = 8.0 * static_cast<double>(std::numeric_limits<float>::max());
+
+using Sums = std::array<double, LeanColumns::kWidth>;
+
+// Of the weights up to each, itself included; exact enough that the choice has the probabilities
+// that are told. In pairs, which do not wait for each other.
+Sums sums_of(const LeanColumns::Column& weights) {
+    std::array<double, LeanColumns::kWidth> w;
+    for (std::size_t i = 0; i < w.size(); ++i) {
+        w[i] = static_cast<double>(weights[i]);
+    }
+    const double two = w[0] + w[1];
+    const double four = two + (w[2] + w[3]);
+    const double six = four + (w[4] + w[5]);
+    return {w[0], two, two + w[2], four, four + w[4], six, six + w[6], six + (w[6] + w[7])};
+}
+
+// The entry that `at`, below the last of the sums, falls into.
+std::size_t entry_at(const LeanColumns::Column& weights, const Sums& sums, double at) {
+    std::size_t entry = 0;
+    for (std::size_t i = 0; i + 1 < sums.size(); ++i) {
+        entry += at >= sums[i] ? 1 : 0;
+    }
+    // Rounding may run past the end: the last possible entry is kept then.
+    while (!(weights[entry] > 0.0f)) {
+        --entry;
+    }
+    return entry;
 }
 
 }  // namespace
@@ -125,16 +166,13 @@ LightTree::LightTree(std::span<const LightBound> bounds) : slot_(bounds.size()) 
         return;
     }
     nodes_.emplace_back();
+    std::vector<LightBound> merged;
     for (std::uint32_t entry = 0; entry < 2; ++entry) {
-        std::vector<LightBound> members;
-        for (const std::uint32_t i : parts[entry]) {
-            members.push_back(bounds[i]);
-        }
+        merged.push_back(merge_bounds(members_of(bounds, parts[entry])));
         const std::uint32_t child = build(bounds, parts[entry], {kRoot, entry});
-        nodes_[kRoot].children[entry] = {child, false};
-        nodes_[kRoot].columns.set(entry, merge_bounds(members));
+        nodes_[kRoot].children[entry] = child;
     }
-    nodes_[kRoot].count = 2;
+    set_bounds(nodes_[kRoot], merged);
 }
 
 // Returns the index of the new node.
@@ -153,63 +191,116 @@ std::uint32_t LightTree::build(std::span<const LightBound> bounds, Order order, 
         *largest = whole.first(left);
         parts.push_back(whole.subspan(left));
     }
-    nodes_[index].count = static_cast<std::uint32_t>(parts.size());
-    std::vector<LightBound> members;
+    std::vector<LightBound> merged;
     for (std::uint32_t entry = 0; entry < parts.size(); ++entry) {
         const Order part = parts[entry];
         if (part.size() == 1) {
-            nodes_[index].children[entry] = {part[0], true};
-            nodes_[index].columns.set(entry, bounds[part[0]]);
+            nodes_[index].children[entry] = part[0] | kLeaf;
             slot_[part[0]] = {index, entry};
+            merged.push_back(bounds[part[0]]);
             continue;
         }
-        members.clear();
-        for (const std::uint32_t i : part) {
-            members.push_back(bounds[i]);
-        }
-        nodes_[index].columns.set(entry, merge_bounds(members));
+        merged.push_back(merge_bounds(members_of(bounds, part)));
         const std::uint32_t child = build(bounds, part, {index, entry});
-        nodes_[index].children[entry] = {child, false};
+        nodes_[index].children[entry] = child;
     }
+    set_bounds(nodes_[index], merged);
     return index;
 }
 
-std::optional<LightChoice> LightTree::choose(const LightSampleContext& context, double u) const {
-    LightChoice choice{0, 1.0f, u};
-    std::uint32_t index = kRoot;
-    while (true) {
-        const Node& node = nodes_[index];
-        LightColumns<kWidth>::Column weights;
-        const float sum = node.columns.estimate(context, node.count, weights);
-        if (!(sum > 0.0f && sum < kInfinity)) {
-            return std::nullopt;
+void LightTree::set_bounds(Node& node, std::span<const LightBound> bounds) {
+    node.count = static_cast<std::uint32_t>(bounds.size());
+    if (!std::ranges::all_of(bounds, LeanColumns::holds)) {
+        node.wide = static_cast<std::uint32_t>(wide_.size());
+        wide_.emplace_back();
+    }
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+        if (node.wide == kNone) {
+            node.columns.set(i, bounds[i]);
+        } else {
+            wide_[node.wide].set(i, bounds[i]);
         }
-        const LightChoice step =
-            choose_in_proportion(std::span(weights).first(node.count), sum, choice.u);
-        choice.pmf *= step.pmf;
-        choice.u = step.u;
-        const Child& child = node.children[step.group];
-        if (child.leaf) {
-            choice.group = child.index;
-            return choice;
+    }
+}
+
+void LightTree::estimate(const Node& node,
+                         const LightSampleContext& context,
+                         LeanColumns::Column& weights) const {
+    if (node.wide == kNone) {
+        node.columns.estimate(context, weights);
+    } else {
+        static_cast<void>(wide_[node.wide].estimate(context, kWidth, weights));
+    }
+}
+
+// One step down: the child, kNone where nothing arrives.
+std::uint32_t LightTree::choose_child(const LightSampleContext& context, Descent& at) const {
+    const Node& node = nodes_[at.node];
+    LeanColumns::Column weights;
+    estimate(node, context, weights);
+    const Sums sums = sums_of(weights);
+    if (!(sums.back() > 0.0 && sums.back() < kLargestSum)) {
+        return kNone;
+    }
+    const double place = at.u * sums.back();
+    const std::size_t entry = entry_at(weights, sums, place);
+    const double before = entry == 0 ? 0.0 : sums[entry - 1];
+    const auto weight = static_cast<double>(weights[entry]);
+    at.u = std::clamp((place - before) / weight, 0.0, 0x1.fffffffffffffp-1);
+    at.pmf *= weight / sums.back();
+    return node.children[entry];
+}
+
+void LightTree::prefetch(std::uint32_t node) const {
+    const auto* first = reinterpret_cast<const char*>(&nodes_[node]);
+    for (std::size_t line = 0; line < sizeof(Node); line += 64) {
+        __builtin_prefetch(first + line);
+    }
+}
+
+void LightTree::choose(std::span<LightQuery> queries) const {
+    constexpr std::size_t kTogether = 16;
+    for (std::size_t first = 0; first < queries.size(); first += kTogether) {
+        const auto part = queries.subspan(first, std::min(kTogether, queries.size() - first));
+        std::array<Descent, kTogether> ways;
+        std::array<std::size_t, kTogether> under_way;
+        for (std::size_t i = 0; i < part.size(); ++i) {
+            ways[i].u = part[i].u_choice;
+            part[i].choice = LightChoice{};
+            under_way[i] = i;
         }
-        index = child.index;
+        for (std::size_t count = part.size(); count > 0;) {
+            std::size_t kept = 0;
+            for (std::size_t k = 0; k < count; ++k) {
+                const std::size_t i = under_way[k];
+                const std::uint32_t child = choose_child(part[i].context, ways[i]);
+                if (child != kNone && (child & kLeaf) == 0) {
+                    prefetch(child);
+                    ways[i].node = child;
+                    under_way[kept++] = i;
+                } else if (child != kNone) {
+                    part[i].choice = {child & ~kLeaf, static_cast<float>(ways[i].pmf), ways[i].u};
+                }
+            }
+            count = kept;
+        }
     }
 }
 
 float LightTree::pmf(const LightSampleContext& context, std::uint32_t light) const {
     Slot at = slot_[light];
-    float pmf = 1.0f;
+    double pmf = 1.0;
     while (true) {
         const Node& node = nodes_[at.node];
-        LightColumns<kWidth>::Column weights;
-        const float sum = node.columns.estimate(context, node.count, weights);
-        if (!(sum > 0.0f && sum < kInfinity)) {
+        LeanColumns::Column weights;
+        estimate(node, context, weights);
+        const double sum = sums_of(weights).back();
+        if (!(sum > 0.0 && sum < kLargestSum)) {
             return 0.0f;
         }
-        pmf *= weights[at.entry] / sum;
+        pmf *= static_cast<double>(weights[at.entry]) / sum;
         if (at.node == kRoot) {
-            return pmf;
+            return static_cast<float>(pmf);
         }
         at = node.parent;
     }

@@ -457,6 +457,14 @@ void Compiler::renumber() {
     return sum;
 }
 
+// Of positive constants alone, and not through the layers of a Principled.
+[[nodiscard]] bool emits_constantly(const Material& material) {
+    const auto plain = [&](const NodeOp& op) { return op.code != NodeOpCode::PrincipledV2; };
+    return material.emits && material.constant &&
+           std::ranges::all_of(material.emission.closures, plain) &&
+           glm::all(glm::greaterThan(material.emission_estimate, Rgb(0.0f)));
+}
+
 }  // namespace
 
 Material compile_material(std::string name,
@@ -473,6 +481,7 @@ Material compile_material(std::string name,
     }
     material.name = std::move(name);
     material.emission_estimate = estimate_emission(material, textures);
+    material.emission_constant = emits_constantly(material);
     return material;
 }
 

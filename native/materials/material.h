@@ -47,7 +47,8 @@ struct Material {
     bool textured = false;     // reads an image
     bool asks_path = false;    // of what kind the ray is, or how deep
     bool emission_sampling = true;
-    Rgb emission_estimate{0.0f};  // mean emitted radiance, for light choice
+    bool emission_constant = false;  // emission_estimate is what every point emits any way
+    Rgb emission_estimate{0.0f};     // mean emitted radiance, for light choice
 };
 
 // Checks `program` (a broken index is reported and the material becomes grey diffuse) and does once

@@ -24,44 +24,57 @@ namespace pharos {
                     0x1.fffffffffffffp-1);
 }
 
+struct AliasSlot {
+    float keep = 1.0f;  // share of the slot that belongs to its own index
+    std::uint32_t alias = 0;
+    float pmf = 0.0f;
+};
+
+struct AliasSample {
+    std::uint32_t index = 0;
+    float pmf = 0.0f;
+    double u = 0.0;  // what is left of the random number, [0, 1)
+};
+
+// The choice among `count` slots, of which slot_at(i) is one; not to be called for none.
+template <class SlotAt>
+[[nodiscard]] inline AliasSample sample_alias(double u, std::size_t count, const SlotAt& slot_at) {
+    const double scaled = u * static_cast<double>(count);
+    const auto place = std::min(static_cast<std::size_t>(scaled), count - 1);
+    const double rest = scaled - static_cast<double>(place);
+    const AliasSlot& slot = slot_at(place);
+    const auto keep = static_cast<double>(slot.keep);
+    if (rest < keep) {
+        return {static_cast<std::uint32_t>(place), slot.pmf, rest / keep};
+    }
+    const std::uint32_t alias = slot.alias;
+    return {
+        alias, slot_at(alias).pmf, std::min((rest - keep) / (1.0 - keep), 0x1.fffffffffffffp-1)};
+}
+
 class AliasTable {
   public:
+    using Sample = AliasSample;
+    using Slot = AliasSlot;
+
     AliasTable() = default;
     explicit AliasTable(std::span<const float> weights);
 
-    struct Sample {
-        std::uint32_t index = 0;
-        float pmf = 0.0f;
-        double u = 0.0;  // what is left of the random number, [0, 1)
-    };
-
     // Not to be called on an empty table.
     [[nodiscard]] Sample sample(double u) const {
-        const double scaled = u * static_cast<double>(slots_.size());
-        const auto slot = std::min(static_cast<std::size_t>(scaled), slots_.size() - 1);
-        const double rest = scaled - static_cast<double>(slot);
-        const double keep = static_cast<double>(slots_[slot].keep);
-        if (rest < keep) {
-            return {static_cast<std::uint32_t>(slot), slots_[slot].pmf, rest / keep};
-        }
-        const std::uint32_t alias = slots_[slot].alias;
-        return {
-            alias, slots_[alias].pmf, std::min((rest - keep) / (1.0 - keep), 0x1.fffffffffffffp-1)};
+        return sample_alias(
+            u, slots_.size(), [this](std::size_t i) -> const Slot& { return slots_[i]; });
     }
 
     [[nodiscard]] float pmf(std::uint32_t index) const { return slots_[index].pmf; }
+
+    [[nodiscard]] const Slot& slot(std::size_t index) const { return slots_[index]; }
 
     [[nodiscard]] std::size_t size() const { return slots_.size(); }
 
     [[nodiscard]] bool empty() const { return slots_.empty(); }
 
   private:
-    struct Slot {
-        float keep = 1.0f;  // share of the slot that belongs to its own index
-        std::uint32_t alias = 0;
-        float pmf = 0.0f;
-    };
-
     std::vector<Slot> slots_;
 };
 

@@ -1,7 +1,11 @@
+#include <array>
+#include <span>
+
 #include "geometry/ray_offset.h"
 #include "integrator/mis.h"
 #include "integrator/path_info.h"
 #include "integrator/stages.h"
+#include "sampling/alias_table.h"
 #include "sampling/sampler.h"
 
 namespace pharos {
@@ -10,6 +14,9 @@ namespace {
 
 // Shadow rays end just before the light, so that an emissive surface does not shade itself.
 constexpr float kShadowEnd = 1.0f - 1e-4f;
+
+// Receivers whose lights are chosen at once.
+constexpr std::size_t kTogether = 16;
 
 SurfaceInteraction point_on_emitter(const Scene& scene,
                                     const LightSamplerSample& light,
@@ -51,19 +58,26 @@ struct Receiver {
     std::uint32_t path = 0;
 };
 
-// Samples one light for a vertex; queues a shadow ray when something may arrive.
-void sample_light(const RenderContext& context, const Receiver& receiver, PathBatch& batch) {
-    const Scene& scene = context.scene;
+[[nodiscard]] LightQuery query_of(const Receiver& receiver, const PathBatch& batch) {
     const SurfaceInteraction& surface = batch.surfaces[receiver.surface];
-    const Bsdf& bsdf = batch.bsdfs[receiver.surface];
-    const PathCounters& counters = batch.counters[receiver.path];
-    const std::uint32_t set = 1u + 2u * counters.depth;
+    const std::uint32_t set = 1u + 2u * batch.counters[receiver.path].depth;
     const Vec4 u =
         sobol_4d(batch.sampler_hash[receiver.path], batch.sample_index[receiver.path], set);
     const LightSampleContext receiving{
         surface.p, surface.ns, batch.traits[receiver.surface].transmission_probability > 0.0f};
+    return {receiving, widen_random(u.x, Vec2(u.y, u.z)), Vec2(u.y, u.z), {}};
+}
 
-    const auto light = scene.lights->sample(receiving, u.x, Vec2(u.y, u.z));
+// Samples the light that was chosen for a vertex; queues a shadow ray when something may arrive.
+void sample_light(const RenderContext& context,
+                  const Receiver& receiver,
+                  const LightQuery& query,
+                  PathBatch& batch) {
+    const Scene& scene = context.scene;
+    const SurfaceInteraction& surface = batch.surfaces[receiver.surface];
+    const Bsdf& bsdf = batch.bsdfs[receiver.surface];
+    const PathCounters& counters = batch.counters[receiver.path];
+    const auto light = scene.lights->sample(query);
     if (!light || counters.bounce > light->sample.max_bounces) {
         return;
     }
@@ -95,6 +109,8 @@ void sample_light(const RenderContext& context, const Receiver& receiver, PathBa
             L = Rgb(1.0f);
             batch.pending_worlds.push_back({{}, sample.wi, shadow});
         }
+    } else if (light->instance != kNone && scene.materials[light->material].emission_constant) {
+        L = scene.materials[light->material].emission_estimate;
     } else if (light->instance != kNone) {
         L = Rgb(1.0f);
         batch.pending_triangles.push_back(
@@ -184,13 +200,25 @@ std::uint64_t sample_direct_light(const RenderContext& context, PathBatch& batch
     batch.pending_lamps.clear();
     batch.pending_worlds.clear();
     std::uint64_t items = 0;
+    std::array<Receiver, kTogether> receivers;
+    std::array<LightQuery, kTogether> queries;
+    std::size_t count = 0;
     for (std::size_t s = 0; s < batch.surfaces.size(); ++s) {
         const std::uint32_t path = batch.surface_path[s];
         const bool smooth =
             batch.bsdfs[s].total_sample_weight > 0.0f && batch.traits[s].delta_probability < 1.0f;
         if (smooth && !batch.counters[path].terminate_at_surface) {
-            sample_light(context, {s, path}, batch);
+            receivers[count] = {s, path};
+            queries[count] = query_of(receivers[count], batch);
+            ++count;
             ++items;
+        }
+        if (count == kTogether || s + 1 == batch.surfaces.size()) {
+            context.scene.lights->choose(std::span(queries).first(count));
+            for (std::size_t k = 0; k < count; ++k) {
+                sample_light(context, receivers[k], queries[k], batch);
+            }
+            count = 0;
         }
     }
     if (!batch.pending_triangles.empty()) {

@@ -37,6 +37,9 @@ inline constexpr float kClearcoatMinAlpha = 1e-3f;  // GTR1 has no singular limi
     const float so = smith_s_isotropic(zo, kClearcoatMaskingAlpha);
     const float si = smith_s_isotropic(zi, kClearcoatMaskingAlpha);
     const float oh = glm::dot(wo, h);
+    if (!(oh > 0.0f)) {
+        return {};  // opposite grazing directions, whose half vector is rounding alone
+    }
     const float pdf = 0.25f * d * zh / oh;
     const float visibility = smith_visibility(zo, so, zi, si, c.smith != 0);
     return {c.weight * closure_reflectance(c, oh) * (d * visibility * zi), pdf};

@@ -1,9 +1,13 @@
+#include <cmath>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "geometry/instance_surface.h"
 #include "geometry/ray_offset.h"
 #include "random_scene.h"
 #include "support/description_builders.h"
+#include "support/stress.h"
 
 namespace pharos::testing {
 namespace {
@@ -39,13 +43,17 @@ Generation advance(const TestGeometry& scene,
 
 class Scale : public ::testing::TestWithParam<float> {};
 
-INSTANTIATE_TEST_SUITE_P(Coordinates, Scale, ::testing::Values(1e-3f, 1.0f, 1e3f, 1e6f));
+INSTANTIATE_TEST_SUITE_P(Coordinates,
+                         Scale,
+                         ::testing::Values(1e-8f, 1e-4f, 1.0f, 1e3f, 1e6f, 1e8f));
 
 // Random triangles near the origin and ten times their extent away, in world space and as
-// instances: no respawned ray may meet the triangle it starts from (about 1.2 million rays in all).
+// instances: no respawned ray may meet the triangle it starts from (1.8 million rays in all).
 TEST_P(Scale, RespawnedRaysNeverHitTheirOwnTriangle) {
     const float scale = GetParam();
     Random random(7);
+    std::size_t all = 0;
+    std::size_t all_self_hits = 0;
     for (const int users : {1, 2}) {
         for (const float shift : {0.0f, 10.0f}) {
             TestGeometry scene;
@@ -71,12 +79,24 @@ TEST_P(Scale, RespawnedRaysNeverHitTheirOwnTriangle) {
             }
             EXPECT_GT(traced, 40000u);
             EXPECT_EQ(self_hits, 0u) << "users " << users << " shift " << shift;
+            all += traced;
+            all_self_hits += self_hits;
         }
     }
+    const std::string at = std::to_string(std::lround(std::log10(scale)));
+    say_stress(("respawned rays at coordinates 10^" + at + ": hits of their own triangle").c_str(),
+               all,
+               static_cast<double>(all_self_hits),
+               0.0);
 }
 
+// Of less than a tenth of a millimetre the distance along the ray has few digits.
+class PointScale : public Scale {};
+
+INSTANTIATE_TEST_SUITE_P(Coordinates, PointScale, ::testing::Values(1e-4f, 1.0f, 1e3f, 1e6f, 1e8f));
+
 // The computed point against the same point in double, and a bound that is not absurd.
-TEST_P(Scale, PointLiesWithinItsErrorBound) {
+TEST_P(PointScale, PointLiesWithinItsErrorBound) {
     const float scale = GetParam();
     Random random(11);
     TestGeometry scene;
@@ -132,7 +152,7 @@ TEST(Watertight, RaysAtVerticesAndEdgesDoNotLeak) {
     for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
         const Instance& instance = scene.instances[i];
         const Mesh& mesh = scene.meshes[instance.mesh];
-        for (int repeat = 0; repeat < 30; ++repeat) {
+        for (int repeat = 0; repeat < 150; ++repeat) {
             const Vec3 from =
                 transform_point(instance.to_world, random.in_box(repeat == 0 ? 0.0f : 0.3f));
             for (const UVec3& t : mesh.triangles) {
@@ -151,8 +171,12 @@ TEST(Watertight, RaysAtVerticesAndEdgesDoNotLeak) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
         leaks += hits[i].instance != aimed_at[i];
     }
-    EXPECT_GT(rays.size(), 200000u);
+    EXPECT_GT(rays.size(), 1000000u);
     EXPECT_EQ(leaks, 0u);
+    say_stress("rays from inside at edges and vertices: leaks",
+               rays.size(),
+               static_cast<double>(leaks),
+               0.0);
 }
 
 // Paths that bounce about inside closed meshes never get out, though many start at edges.
@@ -186,6 +210,8 @@ TEST(Watertight, PathsStayInside) {
     }
     EXPECT_GT(segments, 100000u);
     EXPECT_EQ(leaks, 0u);
+    say_stress(
+        "parts of paths inside closed meshes: leaks", segments, static_cast<double>(leaks), 0.0);
 }
 
 }  // namespace

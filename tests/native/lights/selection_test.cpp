@@ -165,14 +165,65 @@ TEST(LightTree, ProbabilitiesAreThoseOfTheChoiceAndAddUp) {
             // Less where a node promised light that none of its children has.
             EXPECT_LT(sum, 1.0 + 1e-4);
             EXPECT_GT(sum, 0.9);
-            for (int k = 0; k < 200; ++k) {
-                const auto choice = tree.choose(context, static_cast<double>(random.uniform()));
-                if (choice) {
-                    EXPECT_NEAR(choice->pmf / tree.pmf(context, choice->group), 1.0f, 1e-4f);
-                    EXPECT_TRUE(choice->u >= 0.0 && choice->u < 1.0);
+            std::vector<LightQuery> queries(200);
+            for (LightQuery& query : queries) {
+                query = {context, static_cast<double>(random.uniform()), Vec2(0.5f), {}};
+            }
+            tree.choose(queries);
+            for (const LightQuery& query : queries) {
+                const LightChoice& choice = query.choice;
+                if (choice.pmf > 0.0f) {
+                    EXPECT_NEAR(choice.pmf / tree.pmf(context, choice.group), 1.0f, 1e-4f);
+                    EXPECT_TRUE(choice.u >= 0.0 && choice.u < 1.0);
                 }
             }
         }
+    }
+}
+
+// Receivers that descend together do not get into each other's way.
+TEST(LightTree, TogetherAsOneByOne) {
+    Random random(19);
+    const LightTree tree(random_bounds(3000));
+    std::vector<LightQuery> together(61);
+    for (std::size_t i = 0; i < together.size(); ++i) {
+        together[i].context = {random.uniform3() * 8.0f - 4.0f, random.direction(), i % 3 == 0};
+        together[i].u_choice = static_cast<double>(random.uniform());
+    }
+    std::vector<LightQuery> alone = together;
+    tree.choose(together);
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+        tree.choose(std::span(&alone[i], 1));
+        EXPECT_EQ(alone[i].choice.group, together[i].choice.group);
+        EXPECT_EQ(alone[i].choice.pmf, together[i].choice.pmf);
+        EXPECT_EQ(alone[i].choice.u, together[i].choice.u);
+    }
+}
+
+// What is chosen how often is what the probability says, also among siblings of unlike strength.
+TEST(LightTree, ChoosesAsOftenAsItSays) {
+    Random random(23);
+    std::vector<LightBound> bounds(50);
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+        bounds[i].center = random.uniform3() * 6.0f;
+        bounds[i].strength = i % 5 == 0 ? 0.0f : std::pow(10.0f, random.uniform(-3.0f, 0.0f));
+    }
+    const LightTree tree(bounds);
+    const LightSampleContext context{Vec3(1.0f, 2.0f, -1.0f), Vec3(0, 0, 1), true};
+    constexpr std::size_t kSamples = 1 << 18;
+    std::vector<LightQuery> queries(kSamples);
+    for (std::size_t i = 0; i < kSamples; ++i) {
+        queries[i] = {context, (static_cast<double>(i) + 0.5) / kSamples, Vec2(0.5f), {}};
+    }
+    tree.choose(queries);
+    std::vector<double> share(bounds.size());
+    for (const LightQuery& query : queries) {
+        share[query.choice.group] += 1.0 / kSamples;
+    }
+    for (std::uint32_t light = 0; light < bounds.size(); ++light) {
+        // Numbers on a grid: each node on the way moves an edge by one of them at most.
+        EXPECT_NEAR(share[light], static_cast<double>(tree.pmf(context, light)), 4.0 / kSamples)
+            << light;
     }
 }
 
@@ -232,6 +283,8 @@ TEST(Selection, TreeFindsWhatBruteForceFinds) {
         const LampTree tree(lamps);
         Random random(6);
         int hits = 0;
+        std::vector<LampRay> rays;
+        std::vector<std::optional<LampTree::Nearest>> alone;
         for (int i = 0; i < 5000; ++i) {
             Ray ray{random.uniform3() * 10.0f - 5.0f, random.direction()};
             if (i % 10 == 0) {
@@ -244,6 +297,8 @@ TEST(Selection, TreeFindsWhatBruteForceFinds) {
                 }
             }
             const auto found = tree.intersect(ray, nullptr);
+            rays.push_back({ray, nullptr});
+            alone.push_back(found);
             ASSERT_EQ(found.has_value(), nearest < kInfinity);
             if (found) {
                 EXPECT_EQ(found->hit.t, nearest);
@@ -251,6 +306,17 @@ TEST(Selection, TreeFindsWhatBruteForceFinds) {
             }
         }
         EXPECT_GT(hits, 500);
+        std::array<std::optional<LampTree::Nearest>, LampTree::kTogether> together;
+        for (std::size_t i = 0; i + together.size() <= rays.size(); i += together.size()) {
+            tree.intersect(std::span(rays).subspan(i, together.size()), together);
+            for (std::size_t k = 0; k < together.size(); ++k) {
+                ASSERT_EQ(together[k].has_value(), alone[i + k].has_value());
+                if (together[k]) {
+                    EXPECT_EQ(together[k]->lamp, alone[i + k]->lamp);
+                    EXPECT_EQ(together[k]->hit.t, alone[i + k]->hit.t);
+                }
+            }
+        }
     }
 }
 

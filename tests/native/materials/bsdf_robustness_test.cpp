@@ -190,6 +190,28 @@ TEST(Robustness, MillionExtremeParameters) {
     testing::say_stress("materials: not finite, negative or over 1 in sum", tries, 0.0, 0.0);
 }
 
+// Their half vector is rounding alone, and lay below wo's horizon: the density was negative. One in
+// some million of the extreme parameters met it.
+TEST(Robustness, ClearcoatOfOppositeGrazingDirections) {
+    Surface surface;
+    const Vec3 wo = glm::normalize(Vec3(0.00495833f, 0.999988f, 1e-5f));
+    const auto ctx = make_context(wo, 304);
+    const Bsdf& bsdf = build(surface, ctx, [](const auto& c, ClosureSink& sink) {
+        PrincipledV1Inputs in;
+        in.weight = Rgb(1.0f);
+        in.clearcoat = 1.0f;
+        in.clearcoat_roughness = 1.0f;
+        in.normal = in.clearcoat_normal = Vec3(0, 0, 1);
+        setup_principled_v1(in, c, sink);
+    });
+    Random r(1);
+    for (int i = 0; i < 100000; ++i) {
+        const Vec3 opposite(-wo.x + r.uniform(-2e-4f, 2e-4f), -wo.y, r.uniform(0.0f, 1e-6f));
+        const BsdfEval e = eval_bsdf(bsdf, glm::normalize(opposite));
+        ASSERT_TRUE(sane(e.f_cos) && std::isfinite(e.pdf) && e.pdf >= 0.0f) << i;
+    }
+}
+
 TEST(Robustness, FullSinkDropsTheLeastImportant) {
     Surface surface;
     const auto ctx = make_context(Vec3(0, 0, 1), 405);
