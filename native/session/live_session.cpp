@@ -70,7 +70,7 @@ struct LiveSession::Impl {
     std::optional<ViewDescription> last_view;
     bool paused = false;
     bool busy = false;  // taking up a request, or rendering
-    LiveProgress progress;
+    LiveProgress progress;  // has_picture: of the picture under way, whatever is asked for since
     std::uint64_t serial_base = 0;
     std::vector<ReportEntry> report;
     std::shared_ptr<RenderSession> coarse;  // of the newest view; null: none
@@ -94,6 +94,7 @@ struct LiveSession::Impl {
     void render();
     void start(GuideController& controller, std::shared_ptr<RenderSession>& place);
     [[nodiscard]] bool finish(RenderSession& session);
+    void announce_picture(const RenderSession& session);
     void fail(const std::string& error);
     void answer_lobes(const GuideController& controller);
 
@@ -105,6 +106,7 @@ struct LiveSession::Impl {
 void LiveSession::Impl::fail(const std::string& error) {
     const std::lock_guard lock(mutex);
     progress.render = SessionProgress{};
+    progress.has_picture = false;
     progress.render.state = SessionState::Failed;
     progress.render.error = error;
     progress.lost_scene = scene.scene() == nullptr;
@@ -140,6 +142,14 @@ void LiveSession::Impl::take_up(Requests now) {
     }
 }
 
+// With the mutex held.
+void LiveSession::Impl::announce_picture(const RenderSession& session) {
+    if (!progress.has_picture && session.progress().samples > 0) {
+        progress.has_picture = true;
+        changed.notify_all();
+    }
+}
+
 // Waits for the end of a session, which a change brings about early; true: nothing has changed.
 bool LiveSession::Impl::finish(RenderSession& session) {
     std::unique_lock lock(mutex);
@@ -147,6 +157,7 @@ bool LiveSession::Impl::finish(RenderSession& session) {
         lock.unlock();
         const bool ended = session.wait(kPollInterval);
         lock.lock();
+        announce_picture(session);
         if (ended) {
             return !interrupted();
         }
@@ -193,6 +204,7 @@ void LiveSession::Impl::drop_picture() {
         session->reset();
     }
     ++progress.pictures;
+    progress.has_picture = false;
     progress.render = SessionProgress{};
 }
 
@@ -237,6 +249,7 @@ void LiveSession::Impl::run() {
         }
         busy = true;
         Requests now = std::exchange(requests, {});
+        progress.has_picture = progress.has_picture && !now.any();
         const bool hold = paused;
         lock.unlock();
         if (now.any() || now.forget_guide) {
@@ -291,15 +304,16 @@ void LiveSession::set_scene(SceneDescription description) {
     s.changed.notify_all();
 }
 
-void LiveSession::set_view(const ViewDescription& view) {
+bool LiveSession::set_view(const ViewDescription& view) {
     Impl& s = *impl_;
     const std::lock_guard lock(s.mutex);
     if (view == s.last_view) {
-        return;
+        return false;
     }
     s.last_view = view;
     s.requests.view = view;
     s.changed.notify_all();
+    return true;
 }
 
 void LiveSession::set_paused(bool paused) {
@@ -334,6 +348,7 @@ LiveProgress LiveSession::progress() const {
         out.render = s.full->progress();
     }
     out.render.serial += before;
+    out.has_picture = out.has_picture && !s.requests.any();
     return out;
 }
 
@@ -370,6 +385,19 @@ bool LiveSession::wait(std::chrono::milliseconds time) const {
     return impl_->changed.wait_for(lock, time, [&] {
         return !impl_->busy && !impl_->requests.any() && !(impl_->waiting && !impl_->paused);
     });
+}
+
+bool LiveSession::wait_picture(std::chrono::milliseconds time) const {
+    const Impl& s = *impl_;
+    std::unique_lock lock(s.mutex);
+    bool there = false;
+    s.changed.wait_for(lock, time, [&] {
+        there = s.progress.has_picture && !s.requests.any();
+        // With nothing asked for and nothing under way there is none to wait for.
+        const bool resting = !s.busy && !s.requests.any() && (!s.waiting || s.paused);
+        return there || s.paused || resting;
+    });
+    return there;
 }
 
 }  // namespace pharos
