@@ -152,12 +152,16 @@ GuidingContext GuideController::next_pass() const {
 void GuideController::learn(RecordBuffer records,
                             const SelectionPass& work,
                             const Film& film,
-                            ThreadPool& pool) {
+                            ThreadPool& pool,
+                            const CancelFlag* cancel) {
     if (!learning()) {
         return;
     }
     const double recorded = static_cast<double>(records.radiance.size());
-    const TrainStatistics trained = field_->train(records.radiance, pool);
+    const TrainStatistics trained = field_->train(records.radiance, pool, cancel);
+    if (cancel != nullptr && cancel->cancelled()) {
+        return;
+    }
     status_.loss = trained.loss;
     status_.held_out_loss =
         trained.published ? trained.held_out_loss : trained.held_out_loss_before;

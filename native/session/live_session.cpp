@@ -90,7 +90,7 @@ struct LiveSession::Impl {
 
     void run();
     void take_up(Requests now);
-    void drop_picture();
+    [[nodiscard]] std::vector<std::shared_ptr<RenderSession>> drop_picture();
     void render();
     void start(GuideController& controller, std::shared_ptr<RenderSession>& place);
     [[nodiscard]] bool finish(RenderSession& session);
@@ -196,32 +196,36 @@ void LiveSession::Impl::answer_lobes(const GuideController& controller) {
     answer = std::move(found);
 }
 
-// What was shown belongs to an earlier view or scene.
-void LiveSession::Impl::drop_picture() {
+// What was shown belongs to an earlier view or scene. Returned, since it takes time to free.
+std::vector<std::shared_ptr<RenderSession>> LiveSession::Impl::drop_picture() {
+    std::vector<std::shared_ptr<RenderSession>> dropped;
     const std::lock_guard lock(mutex);
     for (std::shared_ptr<RenderSession>* session : {&coarse, &full}) {
         serial_base += *session ? (*session)->progress().serial : 0;
-        session->reset();
+        dropped.push_back(std::move(*session));
     }
     ++progress.pictures;
     progress.has_picture = false;
     progress.render = SessionProgress{};
+    return dropped;
 }
 
 // A coarse picture first, where the view is large, then the view itself.
 void LiveSession::Impl::render() {
-    drop_picture();
+    auto dropped = drop_picture();
     const ViewDescription view = view_of(scene.scene()->description);
     SceneReport none;
     if (const auto small = coarse_view(view)) {
         scene.set_view(*small, closing, none);
         start(no_guide, coarse);
+        dropped.clear();
         const bool complete = finish(*coarse);
         scene.set_view(view, closing, none);
         if (!complete) {
             return;
         }
     }
+    dropped.clear();
     GuideController& controller = guide.begin_picture(*scene.scene(), edited);
     edited = false;
     {
