@@ -40,6 +40,8 @@ constexpr std::uint32_t kEasyPassPart = 4;
 
 // The adjoint must have been learned before paths are killed by it: after so many paths.
 constexpr std::uint64_t kPathsBeforeRoulette = 1u << 17;
+// A guide that has learned another state of the scene follows sooner than one that starts.
+constexpr std::uint64_t kPathsBeforeRouletteAfterEdit = 1u << 15;
 constexpr std::uint32_t kMinPassesBeforeRoulette = 2;
 constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
 // and its sum over all records must be that of what arrived within this factor.
@@ -139,8 +141,9 @@ GuidingContext GuideController::next_pass() const {
     context.selection_serves = status_.guided_share > 0.0;
     context.fixed_share = hard_share_;
     context.probe = !frozen_;
+    const std::uint64_t paths = continued_ ? kPathsBeforeRouletteAfterEdit : kPathsBeforeRoulette;
     const auto patience = static_cast<std::uint32_t>(
-        std::clamp<std::uint64_t>(kPathsBeforeRoulette / std::max<std::uint64_t>(1, pixels_),
+        std::clamp<std::uint64_t>(paths / std::max<std::uint64_t>(1, pixels_),
                                   kMinPassesBeforeRoulette,
                                   kMaxPassesBeforeRoulette));
     if (pass_ >= patience) {
