@@ -285,6 +285,15 @@ def finish(code: int) -> None:
     os._exit(code)
 
 
+def check_comparison() -> None:
+    """The comparison by statistics takes noise for noise, and a tenth more light for a change."""
+    noise = np.random.default_rng(1).exponential(1.0, (2, 64, 64, 4)).astype(np.float32)
+    assert blocks_apart(noise[0], noise[1]) <= _MOST_BLOCKS
+    smooth = 0.9 + 0.1 * noise
+    assert blocks_apart(smooth[0], 1.1 * smooth[1]) > 0.5
+    harness.say("PASS comparison_by_statistics")
+
+
 _fuzzes = [Fuzz(SEED, EDITS), Fuzz(SEED, GUIDED_EDITS, guided=True)]
 _fuzzes += [Fuzz(seed, count) for seed, count in REGRESSIONS]
 _failed = []
@@ -307,6 +316,7 @@ def run_next() -> float:
     return delay
 
 
+check_comparison()
 harness.enable_addon()
 bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(run_next, first_interval=1.0, persistent=True)
