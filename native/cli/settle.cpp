@@ -8,8 +8,8 @@
 #include "cli/options.h"
 #include "core/parallel.h"
 #include "scene/dump.h"
-#include "session/guide_costs.h"
 #include "session/guide_controller.h"
+#include "session/guide_costs.h"
 #include "session/settling.h"
 
 namespace pharos::cli {
@@ -56,8 +56,7 @@ void print(const Settling& settling, const SettlingSettings& settings) {
 // A frame is one sample of each pixel.
 void print_budget(const Settling& settling, const FilmDescription& film, unsigned threads) {
     const GuideCosts costs = measure_guide_costs(guiding_config(GuidingMode::Neural));
-    const double sample =
-        settling.guided_vertices * costs.vertex + settling.records * costs.record;
+    const double sample = settling.guided_vertices * costs.vertex + settling.records * costs.record;
     const double workers = ThreadPool(threads).size();
     std::printf(
         "a guided vertex %.2f us, a record trained %.2f us; a sample has %.2f of these and %.2f of "

@@ -27,8 +27,8 @@ struct Adaptation {
     std::vector<double> kept;  // by frame after the move
     std::vector<double> fresh;
     std::vector<double> unguided;
-    // A frame of another picture, as old as the last of these, by a guide that has learned all along
-    // where the lamp is now.
+    // A frame of another picture, as old as the last of these, by a guide that has learned all
+    // along where the lamp is now.
     double settled = 0.0;
 
     // The first frame from which two in a row are within `factor` of the settled error; the number

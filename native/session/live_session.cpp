@@ -69,7 +69,7 @@ struct LiveSession::Impl {
     std::optional<SceneDescription> last_scene;  // its outline, as asked for
     std::optional<ViewDescription> last_view;
     bool paused = false;
-    bool busy = false;  // taking up a request, or rendering
+    bool busy = false;      // taking up a request, or rendering
     LiveProgress progress;  // has_picture: of the picture under way, whatever is asked for since
     std::uint64_t serial_base = 0;
     std::vector<ReportEntry> report;
