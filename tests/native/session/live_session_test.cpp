@@ -176,7 +176,6 @@ TEST(LiveSession, AViewNeedsNoScene) {
 }
 
 TEST(LiveSession, APictureCanBeWaitedFor) {
-    constexpr std::chrono::seconds kPatience(60);
     LiveSession session(2);
     EXPECT_FALSE(session.wait_picture(kPatience));  // at once: nothing was asked for
     session.set_scene(versioned_rooms(1 << 20));
