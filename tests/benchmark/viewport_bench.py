@@ -280,12 +280,14 @@ def bench_pulse():
     yield from large_scene()
     own = bpy.context.scene.pharos
     own.follow_cycles, own.preview_samples = False, 1
-    yield 1.0
+    area().tag_redraw()
+    yield 2.0
     yield from until(lambda: shown().session.wait(0.0))
     yield 1.0
     idle, idle_worst = yield from heartbeat(5.0)
     own.preview_samples = 100000
-    yield 1.0
+    area().tag_redraw()
+    yield 2.0
     yield from until(lambda: shown().session.progress().has_picture)
     yield 1.0
     busy, busy_worst = yield from heartbeat(10.0)
