@@ -22,7 +22,12 @@ from .view_state import ViewState
 
 _SHORTEST_INTERVAL = 1.0 / 30.0  # seconds between redraws
 _LONGEST_INTERVAL = 0.5
-_DRAWING_SHARE = 0.25  # most of the time may go into rendering, not into showing it
+_DRAWING_SHARE = 0.33  # most of the time goes into rendering, not into showing it
+_PENDING_INTERVAL = 0.005  # seconds between looks for the first picture of a change
+# Seconds that a redraw may wait for the first picture of a change, which it would miss otherwise:
+# drawing the window once more takes the host longer. The first of all is worth more.
+_PATIENCE = 0.03
+_FIRST_PATIENCE = 0.3
 
 _open: weakref.WeakSet = weakref.WeakSet()  # viewports that may be found by their area
 
@@ -45,8 +50,10 @@ class Viewport:
         self._denoiser = None
         self._denoised = 0  # number of the picture that was shown without noise
         self._paused = False  # a final render has the processor
+        self._draw_began = 0.0  # of the last redraw, until its cost is known
         self._next_draw = 0.0  # of more samples of the same picture
         self._drawn_pictures = 0
+        self._changed = True  # since the last redraw
         _open.add(self)
         self._start_timer()
 
@@ -72,6 +79,7 @@ class Viewport:
         if self._session.progress().lost_scene:
             library.clear()
         self._sent_full = library.is_empty
+        self._changed = True
         if handlers.edit_epoch() != self._epoch:
             self._epoch = handlers.edit_epoch()
             library.forget_places()
@@ -95,13 +103,28 @@ class Viewport:
             return False
         if self._denoiser is not None and self._denoiser.is_ready:
             return True
-        serial = self._session.progress().render.serial
-        return self._drawn is None or serial != self._drawn[0]
+        progress = self._session.progress()
+        if not progress.has_picture:
+            return progress.render.state == self._native.SessionState.Failed
+        return self._drawn is None or progress.render.serial != self._drawn[0]
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether the first picture of a change is still to come."""
+        progress = self._session.progress()
+        return not progress.has_picture or progress.pictures != self._drawn_pictures
 
     def is_due(self) -> bool:
         """A new picture is shown at once, more samples of one when drawing has had its share."""
-        new = self._session.progress().pictures != self._drawn_pictures
-        return new or time.monotonic() >= self._next_draw
+        return self.is_pending or time.monotonic() >= self._next_draw
+
+    def count_redraw(self) -> None:
+        """All of the last redraw counts, the host's part of it too."""
+        if self._draw_began:
+            now = time.monotonic()
+            wait = (now - self._draw_began) * (1.0 / _DRAWING_SHARE - 1.0)
+            self._next_draw = now + min(wait, _LONGEST_INTERVAL)
+            self._draw_began = 0.0
 
     def yield_to_render(self) -> None:
         """Stop while a final render is under way; go on from the start afterwards."""
@@ -113,7 +136,7 @@ class Viewport:
     def draw(self, engine, context, depsgraph) -> None:
         if self._session is None:
             return
-        began = time.monotonic()
+        self._draw_began = time.monotonic()
         self._area = context.area.as_pointer()
         lost = self._session.progress().lost_scene and not self._sent_full
         if lost or not self._has_scene:
@@ -121,16 +144,17 @@ class Viewport:
         state = ViewState(self._native, context)
         view = self._native.SceneDescription(compat.version_number())
         self._set_view(view, state, depsgraph)
-        self._session.set_view(view)
+        changed = self._session.set_view(view) or self._changed
+        self._changed = False
         self._crop = state.crop
         self._choose_denoiser(depsgraph.scene)
+        if changed:
+            self._session.wait_picture(_FIRST_PATIENCE if self._texture is None else _PATIENCE)
         self._update_texture()
         self._draw_texture(engine, context, depsgraph)
         progress = self._session.progress()
         failed = progress.render.state == self._native.SessionState.Failed
         engine.update_stats("", progress.render.error if failed else live_line(progress))
-        now = time.monotonic()
-        self._next_draw = now + min((now - began) / _DRAWING_SHARE, _LONGEST_INTERVAL)
 
     def _set_view(self, description, state: ViewState, depsgraph) -> None:
         scene = depsgraph.scene_eval
@@ -198,9 +222,10 @@ class Viewport:
             if viewport is None or viewport.session is None:
                 return None
             viewport.yield_to_render()
+            viewport.count_redraw()
             if viewport.has_news() and viewport.is_due():
                 viewport.redraw()
-            return _SHORTEST_INTERVAL
+            return _PENDING_INTERVAL if viewport.is_pending else _SHORTEST_INTERVAL
 
         bpy.app.timers.register(look, first_interval=_SHORTEST_INTERVAL)
 

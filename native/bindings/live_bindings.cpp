@@ -1,6 +1,6 @@
 // The live session of a viewport: scenes and views in, the newest picture out.
 #include <chrono>
-#include <cstring>
+#include <memory>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -49,19 +49,22 @@ void bind_lobes(py::module_& m) {
 
 // (pixels of height x width x 4 with the bottom row first, serial), or None while there is nothing.
 py::object picture(const LiveSession& session) {
-    LivePicture picture;
+    auto picture = std::make_unique<LivePicture>();
     {
         const py::gil_scoped_release release;
-        picture = session.picture();
+        *picture = session.picture();
     }
-    if (picture.pixels.empty()) {
+    if (picture->pixels.empty()) {
         return py::none();
     }
-    py::array_t<float> pixels(
-        {py::ssize_t{picture.height}, py::ssize_t{picture.width}, py::ssize_t{4}});
-    std::memcpy(
-        pixels.mutable_data(), picture.pixels.data(), picture.pixels.size() * sizeof(float));
-    return py::make_tuple(std::move(pixels), picture.serial);
+    // The array owns the picture: a copy would take milliseconds.
+    LivePicture* owned = picture.release();
+    const py::capsule owner(owned, [](void* held) { delete static_cast<LivePicture*>(held); });
+    const py::array_t<float> pixels(
+        {py::ssize_t{owned->height}, py::ssize_t{owned->width}, py::ssize_t{4}},
+        owned->pixels.data(),
+        owner);
+    return py::make_tuple(pixels, owned->serial);
 }
 
 }  // namespace
@@ -72,7 +75,8 @@ void bind_live(py::module_& m) {
         .def_readonly("render", &LiveProgress::render)
         .def_readonly("pictures", &LiveProgress::pictures)
         .def_readonly("guide_kept", &LiveProgress::guide_kept)
-        .def_readonly("lost_scene", &LiveProgress::lost_scene);
+        .def_readonly("lost_scene", &LiveProgress::lost_scene)
+        .def_readonly("has_picture", &LiveProgress::has_picture);
     using Holder = std::unique_ptr<LiveSession, FreeDelete>;
     py::class_<LiveSession, Holder>(m, "LiveSession", py::module_local())
         .def(py::init([](unsigned threads) { return Holder(new LiveSession(threads)); }),
@@ -89,11 +93,12 @@ void bind_live(py::module_& m) {
         .def(
             "set_view",
             [](LiveSession& session, const SceneDescription& description) {
-                session.set_view(view_of(description));
+                return session.set_view(view_of(description));
             },
             FreeGuard(),
             py::arg("description"),
-            "Camera, film and samples of a description that may hold nothing else.")
+            "Camera, film and samples of a description that may hold nothing else; True: another "
+            "view.")
         .def("set_paused", &LiveSession::set_paused, FreeGuard(), py::arg("paused"))
         .def("forget_guide", &LiveSession::forget_guide, FreeGuard())
         .def("progress", &LiveSession::progress, FreeGuard())
@@ -114,7 +119,16 @@ void bind_live(py::module_& m) {
                 return session.wait(std::chrono::milliseconds(static_cast<long>(seconds * 1e3)));
             },
             FreeGuard(),
-            py::arg("seconds"));
+            py::arg("seconds"))
+        .def(
+            "wait_picture",
+            [](const LiveSession& session, double seconds) {
+                const auto time = std::chrono::milliseconds(static_cast<long>(seconds * 1e3));
+                return session.wait_picture(time);
+            },
+            FreeGuard(),
+            py::arg("seconds"),
+            "Until there is something to show of the newest view and scene: whether there is.");
 }
 
 }  // namespace pharos

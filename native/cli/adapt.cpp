@@ -1,6 +1,8 @@
 // pharos-cli adapt: how fast the guide follows a lamp that moves.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <string>
 
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -45,6 +47,8 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         a.learned = parse_number<std::uint32_t>(name, value);
     } else if (name == "--reference") {
         a.reference = std::max(parse_number<std::uint32_t>(name, value), 1u);
+    } else if (name == "--seeds") {
+        a.seeds = std::max(parse_number<std::uint32_t>(name, value), 1u);
     } else if (name == "--size") {
         options.size = parse_list(name, value);
     } else {
@@ -58,14 +62,58 @@ void set_size(FilmDescription& film, const std::vector<std::uint32_t>& size) {
     film.crop_x = film.crop_y = 0;
 }
 
+// One frame's errors along a line, from the least to the largest of all by their logarithms.
+class Plot {
+  public:
+    explicit Plot(const Adaptation& a) : limit_(kNear * a.settled), low_(limit_), high_(limit_) {
+        for (const std::vector<double>* errors : {&a.kept, &a.fresh, &a.unguided}) {
+            for (const double error : *errors) {
+                low_ = std::min(low_, error);
+                high_ = std::max(high_, error);
+            }
+        }
+    }
+
+    [[nodiscard]] std::string line(double kept, double fresh, double unguided) const {
+        std::string out(kColumns, ' ');
+        out[column(limit_)] = '|';
+        out[column(unguided)] = 'u';
+        out[column(fresh)] = 'f';
+        out[column(kept)] = 'K';
+        return out;
+    }
+
+  private:
+    static constexpr std::size_t kColumns = 48;
+
+    [[nodiscard]] std::size_t column(double error) const {
+        const double place = std::log(error / low_) / std::max(std::log(high_ / low_), 1e-9);
+        return static_cast<std::size_t>(std::clamp(place, 0.0, 1.0) * (kColumns - 1));
+    }
+
+    double limit_;
+    double low_;
+    double high_;
+};
+
 void print(const Adaptation& a) {
-    std::printf("%5s %10s %10s %10s  kept / unguided\n", "frame", "kept", "fresh", "unguided");
+    std::printf("%5s %10s %10s %10s  kept / unguided, and by logarithm: Kept, fresh, unguided\n",
+                "frame",
+                "kept",
+                "fresh",
+                "unguided");
+    const Plot plot(a);
     double worst = 0.0;
     for (std::size_t i = 0; i < a.kept.size(); ++i) {
         const double ratio = a.kept[i] / a.unguided[i];
         worst = std::max(worst, ratio);
-        std::printf(
-            "%5zu %10.5f %10.5f %10.5f  %.3f\n", i, a.kept[i], a.fresh[i], a.unguided[i], ratio);
+        std::printf("%5zu %10.5f %10.5f %10.5f  %.3f %s\n",
+                    i,
+                    a.kept[i],
+                    a.fresh[i],
+                    a.unguided[i],
+                    ratio,
+                    plot.line(a.kept[i], a.fresh[i], a.unguided[i]).c_str());
     }
     std::printf(
         "settled %.5f; within %.1fx of it after %zu frames kept, %zu from nothing "

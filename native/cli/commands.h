@@ -28,6 +28,7 @@ inline constexpr int kExitNotWritten = 5;
 
 int render(const std::vector<std::string>& arguments);
 int field(const std::vector<std::string>& arguments);
+int settle(const std::vector<std::string>& arguments);
 int adapt(const std::vector<std::string>& arguments);
 int merge(const std::vector<std::string>& arguments);
 

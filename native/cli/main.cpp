@@ -50,7 +50,14 @@ constexpr const char* kUsage =
     "  --learned N        frames before it (default: 64)\n"
     "  --reference N      samples of the reference (default: 256)\n"
     "  --size W,H         of the picture (default: the file's)\n"
+    "  --seeds N          errors are means over so many (default: 3)\n"
     "  --seed, --threads, --nee as above\n"
+    "       pharos-cli settle FILE [options]\n"
+    "  error of a live picture by seconds, guided and not, and the size at which all of the guide\n"
+    "  fits into 16 ms a frame\n"
+    "  --seconds N,N,...  CPU seconds over threads (default: 1,2,4,8)\n"
+    "  --turns N          of each (default: 2)\n"
+    "  --reference, --size, --seed, --threads, --nee as above\n"
     "exit codes: 0 done, 1 error, 2 wrong arguments, 3 missing image (--strict), 4 out of memory,\n"
     "5 not written, 130 interrupted, 143 terminated (both write OUT)\n";
 
@@ -62,7 +69,8 @@ struct Command {
 constexpr Command kCommands[] = {{"render", pharos::cli::render},
                                  {"merge", pharos::cli::merge},
                                  {"field", pharos::cli::field},
-                                 {"adapt", pharos::cli::adapt}};
+                                 {"adapt", pharos::cli::adapt},
+                                 {"settle", pharos::cli::settle}};
 
 }  // namespace
 

@@ -35,8 +35,10 @@ void GuidingField::evaluate(const FieldQuery& query, std::span<VmfMixture> mixtu
     evaluate_network(published_view(impl_->layout, impl_->state), query, mixtures);
 }
 
-TrainStatistics GuidingField::train(std::span<const RadianceRecord> records, ThreadPool& pool) {
-    return impl_->trainer.train(impl_->state, records, pool);
+TrainStatistics GuidingField::train(std::span<const RadianceRecord> records,
+                                    ThreadPool& pool,
+                                    const CancelFlag* cancel) {
+    return impl_->trainer.train(impl_->state, records, pool, cancel);
 }
 
 void GuidingField::restart_optimizer() {

@@ -17,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "core/math.h"
 #include "core/parallel.h"
 #include "guiding/directional_mixture.h"
@@ -69,8 +70,11 @@ class GuidingField {
     // >= 32. A non-finite position or normal is taken as zero.
     void evaluate(const FieldQuery& query, std::span<VmfMixture> mixtures) const;
 
-    // One pass of training on all threads of the pool. Bit-equal results for any pool size.
-    TrainStatistics train(std::span<const RadianceRecord> records, ThreadPool& pool);
+    // One pass of training on all threads of the pool. Bit-equal results for any pool size. Where
+    // `cancel` is set meanwhile it ends early and publishes nothing.
+    TrainStatistics train(std::span<const RadianceRecord> records,
+                          ThreadPool& pool,
+                          const CancelFlag* cancel = nullptr);
 
     // After an edit of the scene: weights stay, the learning rate, moments and averages start
     // again.

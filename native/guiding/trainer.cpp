@@ -108,8 +108,10 @@ NetworkView Trainer::view(const NetworkState& state, const AlignedFloats& parame
 
 TrainStatistics Trainer::train(NetworkState& state,
                                std::span<const RadianceRecord> records,
-                               ThreadPool& pool) {
+                               ThreadPool& pool,
+                               const CancelFlag* cancel) {
     TrainStatistics statistics;
+    cancel_ = cancel;
     statistics.records = records.size();
     // Weights that something overwrote: back to the snapshot, or from the start.
     if (!all_finite(state.parameters) || !all_finite(state.average) ||
@@ -132,7 +134,9 @@ TrainStatistics Trainer::train(NetworkState& state,
     Team team;
     team.run(pool, [&] {
         train_batches(state, team, statistics);
-        publish_if_better(state, team, statistics);
+        if (!cancelled()) {
+            publish_if_better(state, team, statistics);
+        }
     });
     return statistics;
 }
@@ -146,7 +150,7 @@ void Trainer::train_batches(NetworkState& state, Team& team, TrainStatistics& st
     const std::size_t size = std::max<std::size_t>(1, records_.training.size());
     const std::size_t epochs = std::clamp<std::size_t>(kRecordsPerPass / size, 1, kMaxEpochs);
     const std::size_t end = epochs * chunks;
-    for (std::size_t visit = 0; visit < end;) {
+    for (std::size_t visit = 0; visit < end && !cancelled();) {
         const std::size_t first = visit % chunks;
         visit += std::min(batch_chunks, chunks - first);
         // A last batch of less than a quarter is too noisy to step on, unless it is all there is.

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "core/cancel.h"
 #include "core/parallel.h"
 #include "guiding/network_state.h"
 #include "guiding/record_set.h"
@@ -17,10 +18,13 @@ class Trainer {
 
     TrainStatistics train(NetworkState& state,
                           std::span<const RadianceRecord> records,
-                          ThreadPool& pool);
+                          ThreadPool& pool,
+                          const CancelFlag* cancel = nullptr);
 
   private:
     class Team;
+
+    [[nodiscard]] bool cancelled() const { return cancel_ != nullptr && cancel_->cancelled(); }
 
     void train_batches(NetworkState& state, Team& team, TrainStatistics& statistics);
     bool train_batch(NetworkState& state, Team& team, std::size_t first_chunk, double& loss);
@@ -31,6 +35,7 @@ class Trainer {
                                    const AlignedFloats& parameters) const;
 
     const NetworkLayout* layout_;
+    const CancelFlag* cancel_ = nullptr;  // of the call under way
     PreparedRecords records_;
     std::vector<AlignedFloats> workspace_;  // one per chunk of a batch
     std::vector<AlignedFloats> gradient_;

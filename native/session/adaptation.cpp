@@ -1,6 +1,7 @@
 #include "session/adaptation.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
 
@@ -8,6 +9,7 @@
 #include "integrator/integrator.h"
 #include "scene/scene.h"
 #include "session/guide_controller.h"
+#include "session/picture_error.h"
 
 namespace pharos {
 
@@ -20,21 +22,6 @@ std::unique_ptr<const Scene> build(SceneDescription description) {
     const CancelFlag never;
     SceneReport report;
     return build_scene(std::move(description), never, report);
-}
-
-double trimmed_error(std::span<const float> picture, std::span<const float> reference) {
-    std::vector<double> errors(reference.size() / 4);
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-        for (std::size_t c = 4 * i; c < 4 * i + 3; ++c) {
-            const auto r = static_cast<double>(reference[c]);
-            const double d = static_cast<double>(picture[c]) - r;
-            errors[i] += d * d / (r * r + 0.01) / 3.0;
-        }
-    }
-    const std::size_t kept = errors.size() - errors.size() / 1000;
-    std::ranges::nth_element(errors, errors.begin() + static_cast<std::ptrdiff_t>(kept - 1));
-    errors.resize(kept);
-    return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(kept);
 }
 
 // One picture that grows frame by frame, as a viewport's does.
@@ -113,6 +100,49 @@ LightDescription& find_lamp(SceneDescription& description, const std::string& na
     return *found;
 }
 
+void add_to(std::vector<double>& sum, const std::vector<double>& values) {
+    sum.resize(values.size());
+    std::ranges::transform(sum, values, sum.begin(), std::plus());
+}
+
+// What all seeds have in common.
+struct Move {
+    const AdaptationSettings& settings;
+    const std::vector<float>& reference;
+    ThreadPool& pool;
+};
+
+// Adds the errors of one seed to `sum`.
+void measure_seed(const Scene& before, const Scene& after, const Move& move, Adaptation& sum) {
+    const AdaptationSettings& settings = move.settings;
+    const FilmDescription& film = after.description.film;
+    const std::uint64_t pixels = std::uint64_t{film.crop_width} * film.crop_height;
+    const auto errors = [&](GuideController& guide, std::uint32_t count) {
+        Frames frames(after, move.pool);
+        std::vector<double> out;
+        for (std::uint32_t i = 0; i < count; ++i) {
+            out.push_back(trimmed_error(frames.next(guide), move.reference));
+        }
+        return out;
+    };
+    GuideController none(GuidingMode::Off, after.bounds, pixels);
+    add_to(sum.unguided, errors(none, settings.frames));
+    GuideController fresh(GuidingMode::Neural, after.bounds, pixels);
+    const std::vector<double> all = errors(fresh, std::max(settings.frames, settings.learned));
+    add_to(sum.fresh, {all.begin(), all.begin() + settings.frames});
+    fresh.begin_picture(after.bounds, pixels, false);
+    const std::vector<double> trained = errors(fresh, settings.frames);
+    const std::uint32_t last = std::min(kSettledFrames, settings.frames);
+    sum.settled += std::accumulate(trained.end() - last, trained.end(), 0.0) / last;
+    GuideController kept(GuidingMode::Neural, before.bounds, pixels);
+    Frames earlier(before, move.pool);
+    for (std::uint32_t i = 0; i < settings.learned; ++i) {
+        static_cast<void>(earlier.next(kept));
+    }
+    kept.begin_picture(after.bounds, pixels, true);
+    add_to(sum.kept, errors(kept, settings.frames));
+}
+
 }  // namespace
 
 std::size_t Adaptation::frames_until(const std::vector<double>& errors, double factor) const {
@@ -130,33 +160,22 @@ Adaptation measure_adaptation(const SceneDescription& description,
     find_lamp(moved, settings.lamp).to_world[3] += Vec4(settings.offset, 0.0f);
     ThreadPool pool(settings.threads);
     const std::vector<float> reference = render_reference(moved, settings.reference, pool);
-    const auto before = build(description);
-    const auto after = build(std::move(moved));
-    const std::uint64_t pixels =
-        std::uint64_t{description.film.crop_width} * description.film.crop_height;
-    const auto errors = [&](GuideController& guide, std::uint32_t count) {
-        Frames frames(*after, pool);
-        std::vector<double> out;
-        for (std::uint32_t i = 0; i < count; ++i) {
-            out.push_back(trimmed_error(frames.next(guide), reference));
-        }
-        return out;
-    };
+    const Move move{settings, reference, pool};
     Adaptation result;
-    GuideController none(GuidingMode::Off, after->bounds, pixels);
-    result.unguided = errors(none, settings.frames);
-    GuideController fresh(GuidingMode::Neural, after->bounds, pixels);
-    const std::vector<double> all =
-        errors(fresh, std::max(settings.frames, settings.learned) + kSettledFrames);
-    result.fresh.assign(all.begin(), all.begin() + settings.frames);
-    result.settled = std::accumulate(all.end() - kSettledFrames, all.end(), 0.0) / kSettledFrames;
-    GuideController kept(GuidingMode::Neural, before->bounds, pixels);
-    Frames earlier(*before, pool);
-    for (std::uint32_t i = 0; i < settings.learned; ++i) {
-        static_cast<void>(earlier.next(kept));
+    const double part = 1.0 / std::max(1u, settings.seeds);
+    for (std::uint32_t seed = 0; seed < std::max(1u, settings.seeds); ++seed) {
+        SceneDescription from = description;
+        SceneDescription to = moved;
+        from.settings.seed += seed;
+        to.settings.seed += seed;
+        measure_seed(*build(std::move(from)), *build(std::move(to)), move, result);
     }
-    kept.begin_picture(after->bounds, pixels, true);
-    result.kept = errors(kept, settings.frames);
+    for (std::vector<double>* errors : {&result.kept, &result.fresh, &result.unguided}) {
+        for (double& error : *errors) {
+            error *= part;
+        }
+    }
+    result.settled *= part;
     return result;
 }
 

@@ -19,6 +19,7 @@ struct AdaptationSettings {
     std::uint32_t frames = 24;
     std::uint32_t learned = 64;     // frames before the lamp moves
     std::uint32_t reference = 256;  // samples of the reference
+    std::uint32_t seeds = 3;        // errors are means over so many
     unsigned threads = 0;
 };
 
@@ -26,7 +27,9 @@ struct Adaptation {
     std::vector<double> kept;  // by frame after the move
     std::vector<double> fresh;
     std::vector<double> unguided;
-    double settled = 0.0;  // a frame of a guide that has learned all along where the lamp is now
+    // A frame of another picture, as old as the last of these, by a guide that has learned all
+    // along where the lamp is now.
+    double settled = 0.0;
 
     // The first frame from which two in a row are within `factor` of the settled error; the number
     // of frames where there is none.

@@ -44,6 +44,8 @@ constexpr std::uint32_t kEasyPassPart = 4;
 
 // The adjoint must have been learned before paths are killed by it: after so many paths.
 constexpr std::uint64_t kPathsBeforeRoulette = 1u << 17;
+// A guide that has learned another state of the scene follows sooner than one that starts.
+constexpr std::uint64_t kPathsBeforeRouletteAfterEdit = 1u << 15;
 constexpr std::uint32_t kMinPassesBeforeRoulette = 2;
 constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
 // and its sum over all records must be that of what arrived within this factor.
@@ -143,8 +145,9 @@ GuidingContext GuideController::next_pass() const {
     context.selection_serves = status_.guided_share > 0.0;
     context.fixed_share = hard_share_;
     context.probe = !frozen_;
+    const std::uint64_t paths = continued_ ? kPathsBeforeRouletteAfterEdit : kPathsBeforeRoulette;
     const auto patience = static_cast<std::uint32_t>(
-        std::clamp<std::uint64_t>(kPathsBeforeRoulette / std::max<std::uint64_t>(1, pixels_),
+        std::clamp<std::uint64_t>(paths / std::max<std::uint64_t>(1, pixels_),
                                   kMinPassesBeforeRoulette,
                                   kMaxPassesBeforeRoulette));
     if (pass_ >= patience) {
@@ -156,12 +159,16 @@ GuidingContext GuideController::next_pass() const {
 void GuideController::learn(RecordBuffer records,
                             const SelectionPass& work,
                             const Film& film,
-                            ThreadPool& pool) {
+                            ThreadPool& pool,
+                            const CancelFlag* cancel) {
     if (!learning()) {
         return;
     }
     const double recorded = static_cast<double>(records.radiance.size());
-    const TrainStatistics trained = field_->train(records.radiance, pool);
+    const TrainStatistics trained = field_->train(records.radiance, pool, cancel);
+    if (cancel != nullptr && cancel->cancelled()) {
+        return;
+    }
     status_.loss = trained.loss;
     status_.held_out_loss =
         trained.published ? trained.held_out_loss : trained.held_out_loss_before;

@@ -53,8 +53,13 @@ class GuideController {
     // What the next pass may use. Valid until learn() is called.
     [[nodiscard]] GuidingContext next_pass() const;
 
-    // Takes what a pass recorded, with its counted work, and the picture so far.
-    void learn(RecordBuffer records, const SelectionPass& work, const Film& film, ThreadPool& pool);
+    // Takes what a pass recorded, with its counted work, and the picture so far. Where `cancel` is
+    // set meanwhile the pass is forgotten but for what the field has learned from it.
+    void learn(RecordBuffer records,
+               const SelectionPass& work,
+               const Film& film,
+               ThreadPool& pool,
+               const CancelFlag* cancel = nullptr);
 
     // Counts a pass taken while nothing is learned: the gate opens again, rarely, for a probe.
     void rest();

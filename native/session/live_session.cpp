@@ -69,8 +69,8 @@ struct LiveSession::Impl {
     std::optional<SceneDescription> last_scene;  // its outline, as asked for
     std::optional<ViewDescription> last_view;
     bool paused = false;
-    bool busy = false;  // taking up a request, or rendering
-    LiveProgress progress;
+    bool busy = false;      // taking up a request, or rendering
+    LiveProgress progress;  // has_picture: of the picture under way, whatever is asked for since
     std::uint64_t serial_base = 0;
     std::vector<ReportEntry> report;
     std::shared_ptr<RenderSession> coarse;  // of the newest view; null: none
@@ -90,10 +90,11 @@ struct LiveSession::Impl {
 
     void run();
     void take_up(Requests now);
-    void drop_picture();
+    [[nodiscard]] std::vector<std::shared_ptr<RenderSession>> drop_picture();
     void render();
     void start(GuideController& controller, std::shared_ptr<RenderSession>& place);
     [[nodiscard]] bool finish(RenderSession& session);
+    void announce_picture(const RenderSession& session);
     void fail(const std::string& error);
     void answer_lobes(const GuideController& controller);
 
@@ -105,6 +106,7 @@ struct LiveSession::Impl {
 void LiveSession::Impl::fail(const std::string& error) {
     const std::lock_guard lock(mutex);
     progress.render = SessionProgress{};
+    progress.has_picture = false;
     progress.render.state = SessionState::Failed;
     progress.render.error = error;
     progress.lost_scene = scene.scene() == nullptr;
@@ -140,6 +142,14 @@ void LiveSession::Impl::take_up(Requests now) {
     }
 }
 
+// With the mutex held.
+void LiveSession::Impl::announce_picture(const RenderSession& session) {
+    if (!progress.has_picture && session.progress().samples > 0) {
+        progress.has_picture = true;
+        changed.notify_all();
+    }
+}
+
 // Waits for the end of a session, which a change brings about early; true: nothing has changed.
 bool LiveSession::Impl::finish(RenderSession& session) {
     std::unique_lock lock(mutex);
@@ -147,6 +157,7 @@ bool LiveSession::Impl::finish(RenderSession& session) {
         lock.unlock();
         const bool ended = session.wait(kPollInterval);
         lock.lock();
+        announce_picture(session);
         if (ended) {
             return !interrupted();
         }
@@ -185,31 +196,36 @@ void LiveSession::Impl::answer_lobes(const GuideController& controller) {
     answer = std::move(found);
 }
 
-// What was shown belongs to an earlier view or scene.
-void LiveSession::Impl::drop_picture() {
+// What was shown belongs to an earlier view or scene. Returned, since it takes time to free.
+std::vector<std::shared_ptr<RenderSession>> LiveSession::Impl::drop_picture() {
+    std::vector<std::shared_ptr<RenderSession>> dropped;
     const std::lock_guard lock(mutex);
     for (std::shared_ptr<RenderSession>* session : {&coarse, &full}) {
         serial_base += *session ? (*session)->progress().serial : 0;
-        session->reset();
+        dropped.push_back(std::move(*session));
     }
     ++progress.pictures;
+    progress.has_picture = false;
     progress.render = SessionProgress{};
+    return dropped;
 }
 
 // A coarse picture first, where the view is large, then the view itself.
 void LiveSession::Impl::render() {
-    drop_picture();
+    auto dropped = drop_picture();
     const ViewDescription view = view_of(scene.scene()->description);
     SceneReport none;
     if (const auto small = coarse_view(view)) {
         scene.set_view(*small, closing, none);
         start(no_guide, coarse);
+        dropped.clear();
         const bool complete = finish(*coarse);
         scene.set_view(view, closing, none);
         if (!complete) {
             return;
         }
     }
+    dropped.clear();
     GuideController& controller = guide.begin_picture(*scene.scene(), edited);
     edited = false;
     {
@@ -237,6 +253,7 @@ void LiveSession::Impl::run() {
         }
         busy = true;
         Requests now = std::exchange(requests, {});
+        progress.has_picture = progress.has_picture && !now.any();
         const bool hold = paused;
         lock.unlock();
         if (now.any() || now.forget_guide) {
@@ -291,15 +308,16 @@ void LiveSession::set_scene(SceneDescription description) {
     s.changed.notify_all();
 }
 
-void LiveSession::set_view(const ViewDescription& view) {
+bool LiveSession::set_view(const ViewDescription& view) {
     Impl& s = *impl_;
     const std::lock_guard lock(s.mutex);
     if (view == s.last_view) {
-        return;
+        return false;
     }
     s.last_view = view;
     s.requests.view = view;
     s.changed.notify_all();
+    return true;
 }
 
 void LiveSession::set_paused(bool paused) {
@@ -334,6 +352,7 @@ LiveProgress LiveSession::progress() const {
         out.render = s.full->progress();
     }
     out.render.serial += before;
+    out.has_picture = out.has_picture && !s.requests.any();
     return out;
 }
 
@@ -370,6 +389,19 @@ bool LiveSession::wait(std::chrono::milliseconds time) const {
     return impl_->changed.wait_for(lock, time, [&] {
         return !impl_->busy && !impl_->requests.any() && !(impl_->waiting && !impl_->paused);
     });
+}
+
+bool LiveSession::wait_picture(std::chrono::milliseconds time) const {
+    const Impl& s = *impl_;
+    std::unique_lock lock(s.mutex);
+    bool there = false;
+    s.changed.wait_for(lock, time, [&] {
+        there = s.progress.has_picture && !s.requests.any();
+        // With nothing asked for and nothing under way there is none to wait for.
+        const bool resting = !s.busy && !s.requests.any() && (!s.waiting || s.paused);
+        return there || s.paused || resting;
+    });
+    return there;
 }
 
 }  // namespace pharos

@@ -3,7 +3,8 @@
 // A change ends the picture under way within a batch, and the next one starts from what is built
 // already (LiveScene) and what the guide has learned (GuideMemory). All of it runs on threads of
 // the session: every function is thread-safe and returns at once, except picture() (copies a
-// pass), wait() and the destructor (cancels and joins). Changes are coalesced, the last one counts.
+// pass), wait(), wait_picture() and the destructor (cancels and joins). Changes are coalesced, the
+// last one counts.
 #pragma once
 
 #include <chrono>
@@ -23,6 +24,7 @@ struct LiveProgress {
     std::uint64_t pictures = 0;  // begun so far: grows with every change
     bool guide_kept = false;     // the guide has learned from earlier pictures
     bool lost_scene = false;     // after a failure: the next scene must come in full
+    bool has_picture = false;    // of the newest view and scene there is something to show
 };
 
 class LiveSession {
@@ -36,8 +38,8 @@ class LiveSession {
     // (LiveScene). Nothing starts again where nothing has changed.
     void set_scene(SceneDescription description);
 
-    // Another view of the same scene.
-    void set_view(const ViewDescription& view);
+    // Another view of the same scene; whether it is another one.
+    bool set_view(const ViewDescription& view);
 
     void set_paused(bool paused);  // while paused nothing renders; afterwards it starts again
 
@@ -57,6 +59,10 @@ class LiveSession {
 
     // True when every change has been taken up and the picture has ended, within the time.
     bool wait(std::chrono::milliseconds time) const;
+
+    // True when there is something to show of the newest view and scene, within the time; false at
+    // once when there will be nothing (paused, failed).
+    bool wait_picture(std::chrono::milliseconds time) const;
 
   private:
     struct Impl;

@@ -13,27 +13,67 @@ constexpr double kHardVariance = 4.0;
 constexpr double kMaxSquare = 2000.0;
 constexpr double kFloor = 0.1;  // of the mean
 constexpr int kRadius = 3;
+constexpr double kUnit = 1 << 20;  // of what is summed up, relative to the mean
+constexpr double kMaxRelative = 1e9;
 // 1, 1, 2, 3, 4, 4, ...: near the inverse of the variance that guided passes were seen to have.
 constexpr double kLastWeight = 4.0;
 
-// Sums over windows of 2 kRadius + 1 pixels along an axis.
-std::vector<double> window_sums(const std::vector<double>& in, int width, int height, int axis) {
-    std::vector<double> out(in.size());
-    const int step = axis == 0 ? 1 : width;
-    const int length = axis == 0 ? width : height;
-    for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-            const int at = axis == 0 ? x : y;
-            const int from = std::max(-kRadius, -at);
-            const int to = std::min(kRadius, length - 1 - at);
-            double sum = 0.0;
-            for (int d = from; d <= to; ++d) {
-                sum += in[static_cast<std::size_t>(y * width + x + d * step)];
+// Sums over the windows of 2 kRadius + 1 pixels a side, each from the next: whole numbers of
+// kUnit, so that nothing is lost on the way.
+class WindowSums {
+  public:
+    WindowSums(int width, int height)
+        : width_(width), height_(height), columns_(static_cast<std::size_t>(width)) {}
+
+    // visit(x, y, sum) for every pixel of `in`, row by row.
+    template <class Visit>
+    void for_each(const std::vector<std::int64_t>& in, const Visit& visit) {
+        std::ranges::fill(columns_, 0);
+        for (int y = 0; y < std::min(kRadius, height_); ++y) {
+            add_row(in, y, 1);
+        }
+        for (int y = 0; y < height_; ++y) {
+            if (y + kRadius < height_) {
+                add_row(in, y + kRadius, 1);
             }
-            out[static_cast<std::size_t>(y * width + x)] = sum;
+            if (y - kRadius - 1 >= 0) {
+                add_row(in, y - kRadius - 1, -1);
+            }
+            std::int64_t sum = 0;
+            for (int x = 0; x < std::min(kRadius, width_); ++x) {
+                sum += column(x);
+            }
+            for (int x = 0; x < width_; ++x) {
+                sum += x + kRadius < width_ ? column(x + kRadius) : 0;
+                sum -= x - kRadius - 1 >= 0 ? column(x - kRadius - 1) : 0;
+                visit(x, y, sum);
+            }
         }
     }
-    return out;
+
+  private:
+    void add_row(const std::vector<std::int64_t>& in, int y, std::int64_t sign) {
+        for (int x = 0; x < width_; ++x) {
+            columns_[static_cast<std::size_t>(x)] +=
+                sign * in[static_cast<std::size_t>(y * width_ + x)];
+        }
+    }
+
+    [[nodiscard]] std::int64_t column(int x) const { return columns_[static_cast<std::size_t>(x)]; }
+
+    int width_;
+    int height_;
+    std::vector<std::int64_t> columns_;
+};
+
+// Pixels of the colour of (x, y) in the window around it.
+int own_pixels(int x, int y, int width, int height) {
+    const int left = std::max(0, x - kRadius);
+    const int bottom = std::max(0, y - kRadius);
+    const int area = (std::min(width - 1, x + kRadius) - left + 1) *
+                     (std::min(height - 1, y + kRadius) - bottom + 1);
+    const bool own_corner = (left + bottom) % 2 == (x + y) % 2;
+    return (area + (own_corner ? 1 : 0)) / 2;
 }
 
 }  // namespace
@@ -41,37 +81,45 @@ std::vector<double> window_sums(const std::vector<double>& in, int width, int he
 std::array<double, 2> relative_variance(const FirstPasses& passes) {
     const auto width = static_cast<int>(passes.width);
     const auto height = static_cast<int>(passes.height);
+    WindowSums windows(width, height);
     std::array<double, 2> out{};
     for (int color = 0; color < 2; ++color) {
-        std::vector<double> value(passes.first.size());
-        std::vector<double> count(passes.first.size());
+        const auto mean_of = [&](int x, int y) {
+            const auto i = static_cast<std::size_t>(y * width + x);
+            return 0.5 *
+                   (static_cast<double>(passes.first[i]) + static_cast<double>(passes.second[i]));
+        };
         double sum = 0.0;
         double pixels = 0.0;
-        const auto for_each_own = [&](const auto& visit) {
-            for (int y = 0; y < height; ++y) {
-                for (int x = (y + color) % 2; x < width; x += 2) {
-                    visit(static_cast<std::size_t>(y * width + x));
-                }
+        for (int y = 0; y < height; ++y) {
+            for (int x = (y + color) % 2; x < width; x += 2) {
+                sum += mean_of(x, y);
+                pixels += 1.0;
             }
-        };
-        for_each_own([&](std::size_t i) {
-            value[i] = 0.5 * (static_cast<double>(passes.first[i]) +
-                              static_cast<double>(passes.second[i]));
-            count[i] = 1.0;
-            sum += value[i];
-            pixels += 1.0;
-        });
+        }
         if (!(sum > 0.0)) {
             continue;
         }
-        const double floor = kFloor * sum / pixels;
-        value = window_sums(window_sums(value, width, height, 0), width, height, 1);
-        count = window_sums(window_sums(count, width, height, 0), width, height, 1);
+        const double mean = sum / pixels;
+        std::vector<std::int64_t> values(passes.first.size());
+        for (int y = 0; y < height; ++y) {
+            for (int x = (y + color) % 2; x < width; x += 2) {
+                const double relative = std::clamp(mean_of(x, y) / mean, 0.0, kMaxRelative);
+                values[static_cast<std::size_t>(y * width + x)] =
+                    static_cast<std::int64_t>(relative * kUnit);
+            }
+        }
         double total = 0.0;
-        for_each_own([&](std::size_t i) {
+        windows.for_each(values, [&](int x, int y, std::int64_t window) {
+            if ((x + y) % 2 != color) {
+                return;
+            }
+            const auto i = static_cast<std::size_t>(y * width + x);
             const double d =
-                static_cast<double>(passes.first[i]) - static_cast<double>(passes.second[i]);
-            const double unit = std::max(value[i] / count[i], floor);
+                (static_cast<double>(passes.first[i]) - static_cast<double>(passes.second[i])) /
+                mean;
+            const int count = own_pixels(x, y, width, height);
+            const double unit = std::max(static_cast<double>(window) / (kUnit * count), kFloor);
             total += std::min(0.5 * d * d / (unit * unit), kMaxSquare);
         });
         out[static_cast<std::size_t>(color)] = total / pixels;

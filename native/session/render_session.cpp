@@ -111,6 +111,7 @@ struct RenderSession::Work {
     RenderPosition position;
     std::uint64_t nonfinite_before = 0;  // in the checkpoint it went on from
     double cpu_begin = process_cpu_seconds();
+    bool live = false;  // another picture waits for the end of a cancelled one
     std::function<void(const GuideController&)> after_pass = {};
 };
 
@@ -299,6 +300,7 @@ void RenderSession::Impl::render(const Scene& scene,
     GuideController& guide = built != nullptr ? built->guide : own_guide.emplace(make_guide(scene));
     Work work{pool, integrator, *shared_film, guide, {}};
     if (built != nullptr) {
+        work.live = true;
         work.after_pass = built->after_pass;
     }
     CheckpointKeeper keeper(options.checkpoint, identity);
@@ -342,12 +344,17 @@ void RenderSession::Impl::render_passes(const RenderSettings& settings,
         pass.weight = work.guide.weight(done);
         pass.offset = options.sample_offset;
         if ((done > 0 && stop.reached()) || !render_pass(pass, stop, work)) {
-            finish_pass(work);
+            if (!work.live) {
+                finish_pass(work);
+            }
             return;
         }
         done += pass.samples;
         work.guide.see(work.film.film, done);
         learn(work);
+        if (work.live && cancel.cancelled()) {
+            return;
+        }
         finish_pass(work);
         if (work.after_pass) {
             work.after_pass(work.guide);
@@ -386,7 +393,8 @@ void RenderSession::Impl::learn(Work& work) {
     }
     const std::uint64_t items = records.radiance.size();
     const Clock::time_point begin = Clock::now();
-    work.guide.learn(std::move(records), counted, work.film.film, work.pool);
+    const CancelFlag* abandon = work.live ? &cancel : nullptr;
+    work.guide.learn(std::move(records), counted, work.film.film, work.pool, abandon);
     work.integrator.book_training(items, static_cast<std::uint64_t>(1e9 * seconds_since(begin)));
 }
 

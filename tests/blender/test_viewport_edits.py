@@ -1,7 +1,8 @@
 """Edit fuzzing: after each of many random edits the viewport shows what a fresh start would show.
 
-Bit by bit, with the guide off. PHAROS_FUZZ_EDITS and PHAROS_FUZZ_SEED (tests/fuzz_edits sets them)
-ask for more edits than the few of a usual run; seeds that once failed are run as well.
+Bit by bit, with the guide off; with it, whose learning depends on when an edit came, by statistics.
+PHAROS_FUZZ_EDITS and PHAROS_FUZZ_SEED (tests/fuzz_edits sets them) ask for more edits than the few
+of a usual run, with and without the guide; seeds that once failed are run as well.
 """
 # hosts: window
 
@@ -19,6 +20,7 @@ import harness
 import numpy as np
 
 EDITS = int(os.environ.get("PHAROS_FUZZ_EDITS", "30"))
+GUIDED_EDITS = int(os.environ.get("PHAROS_FUZZ_EDITS", "10"))
 SEED = int(os.environ.get("PHAROS_FUZZ_SEED", "1"))
 # (seed, edits): sequences that once showed a stale picture.
 REGRESSIONS: tuple[tuple[int, int], ...] = ()
@@ -26,6 +28,12 @@ REGRESSIONS: tuple[tuple[int, int], ...] = ()
 _TICK = 0.02
 _UNDO_SHARE = 0.25
 _PATIENCE = 20.0  # seconds for one picture
+_GUIDED_SAMPLES = 16
+_BLOCK = 8  # pixels a side
+# Of 8 x 8 pixels whose means differ by more than so many standard errors, this share is chance:
+# few of their differences are normal.
+_MOST_ERRORS = 5.0
+_MOST_BLOCKS = 0.02
 
 
 def window():
@@ -139,8 +147,8 @@ def shown_picture():
     return viewport.session.picture()[0]
 
 
-def fresh_picture() -> np.ndarray:
-    """What a session shows that knows nothing of any edit."""
+def fresh_picture(other_seed: int = 0) -> np.ndarray:
+    """What a session shows that knows nothing of any edit; with another seed, other noise."""
     from pharos.export.library import Library
     from pharos.export.report import Report
     from pharos.export.scene import export_scene, set_view
@@ -154,6 +162,8 @@ def fresh_picture() -> np.ndarray:
         description = export_scene(native, depsgraph, Report(), library=Library())
         set_view(native, description, scene, ViewState(native, bpy.context).view())
         description.set_settings(samples=viewport_samples(scene), time_limit=0.0)
+        if other_seed:
+            description.set_settings(seed=scene.pharos.seed + other_seed)
     session = native.LiveSession(2)
     session.set_scene(description)
     assert session.wait(_PATIENCE), "a fresh start did not end"
@@ -162,11 +172,22 @@ def fresh_picture() -> np.ndarray:
     return found[0]
 
 
+def blocks_apart(shown: np.ndarray, fresh: np.ndarray) -> float:
+    """The share of blocks of two pictures with independent noise whose means are not the same."""
+    rows, columns = (size // _BLOCK * _BLOCK for size in shown.shape[:2])
+    apart = (shown - fresh)[:rows, :columns, :3].astype(np.float64).mean(-1)
+    blocks = apart.reshape(rows // _BLOCK, _BLOCK, columns // _BLOCK, _BLOCK).swapaxes(1, 2)
+    blocks = blocks.reshape(-1, _BLOCK * _BLOCK)
+    error = blocks.std(-1) / _BLOCK + 1e-4
+    return float(np.mean(np.abs(blocks.mean(-1)) > _MOST_ERRORS * error))
+
+
 class Fuzz:
     """A sequence of edits of one seed; step() is called from a timer until it returns None."""
 
-    def __init__(self, seed: int, count: int):
-        self.name = f"edits_seed_{seed}"
+    def __init__(self, seed: int, count: int, guided: bool = False):
+        self.name = f"guided_edits_seed_{seed}" if guided else f"edits_seed_{seed}"
+        self._guided = guided
         self._random = random_module.Random(seed)
         self._count = count
         self._done: list[str] = []
@@ -193,7 +214,9 @@ class Fuzz:
         yield _TICK
         edits.object_mode()
         bpy.context.view_layer.material_override = None
-        edits.build_scene(self._random)
+        own = edits.build_scene(self._random).pharos
+        if self._guided:
+            own.guiding, own.preview_samples = "NEURAL", _GUIDED_SAMPLES
         space.overlay.show_overlays = space.show_gizmo = False
         space.region_3d.view_perspective = "PERSP"
         set_border(space, 0.3, 0.3)
@@ -225,8 +248,8 @@ class Fuzz:
         while True:
             shown = shown_picture()
             if shown is not None:
-                fresh = fresh_picture()
-                if shown.shape == fresh.shape and np.array_equal(shown, fresh):
+                fresh = fresh_picture(differing + 1000 if self._guided else 0)
+                if shown.shape == fresh.shape and self._alike(shown, fresh):
                     assert np.isfinite(shown).all()
                     return
                 # An edit may not have reached the viewport yet; a stale picture stays one.
@@ -234,6 +257,11 @@ class Fuzz:
             if differing > 4 or time.monotonic() - began > _PATIENCE:
                 raise AssertionError(self._complaint(shown))
             yield 0.1 if differing else _TICK
+
+    def _alike(self, shown, fresh) -> bool:
+        if self._guided:
+            return blocks_apart(shown, fresh) <= _MOST_BLOCKS
+        return np.array_equal(shown, fresh)
 
     def _complaint(self, shown) -> str:
         last = " ".join(name.removeprefix("edit_") for name in self._done[-6:])
@@ -245,6 +273,8 @@ class Fuzz:
         fresh = fresh_picture()
         if shown.shape != fresh.shape:
             return f"{where}: size {shown.shape}, fresh {fresh.shape}"
+        if self._guided:
+            return f"{where}: {blocks_apart(shown, fresh_picture(2000)):.1%} of the blocks differ"
         apart = np.abs(shown - fresh)
         return f"{where}: {np.count_nonzero(apart.max(-1))} pixels differ, by {apart.max()}"
 
@@ -255,7 +285,17 @@ def finish(code: int) -> None:
     os._exit(code)
 
 
-_fuzzes = [Fuzz(SEED, EDITS), *(Fuzz(seed, count) for seed, count in REGRESSIONS)]
+def check_comparison() -> None:
+    """The comparison by statistics takes noise for noise, and a tenth more light for a change."""
+    noise = np.random.default_rng(1).exponential(1.0, (2, 64, 64, 4)).astype(np.float32)
+    assert blocks_apart(noise[0], noise[1]) <= _MOST_BLOCKS
+    smooth = 0.9 + 0.1 * noise
+    assert blocks_apart(smooth[0], 1.1 * smooth[1]) > 0.5
+    harness.say("PASS comparison_by_statistics")
+
+
+_fuzzes = [Fuzz(SEED, EDITS), Fuzz(SEED, GUIDED_EDITS, guided=True)]
+_fuzzes += [Fuzz(seed, count) for seed, count in REGRESSIONS]
 _failed = []
 
 
@@ -276,6 +316,7 @@ def run_next() -> float:
     return delay
 
 
+check_comparison()
 harness.enable_addon()
 bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(run_next, first_interval=1.0, persistent=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 def digest(parts) -> bytes:
     """Of arrays and plain values, in order."""
-    state = hashlib.blake2b(digest_size=16)
+    state = hashlib.sha256()  # processors have instructions for it
     for part in parts:
         if isinstance(part, np.ndarray):
             state.update(repr((part.shape, part.dtype.str)).encode())
@@ -132,6 +132,8 @@ class Library:
         if image.is_dirty or pointer in self._tagged:
             return None
         packed = image.packed_file
+        # Asking for the size of an image that lies in a file would load it.
+        size = (image.generated_width, image.generated_height, image.use_generated_float)
         return (
             pointer,
             image.name_full,
@@ -141,8 +143,7 @@ class Library:
             image.source,
             image.colorspace_settings.name,
             image.alpha_mode,
-            tuple(image.size),
-            image.is_float,
+            *size,
             image.generated_type,
             tuple(image.generated_color),
         )

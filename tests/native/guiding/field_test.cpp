@@ -321,6 +321,19 @@ TEST(Field, AttacksLeaveItFinite) {
     }
 }
 
+TEST(Field, CancelledTrainingPublishesNothing) {
+    ThreadPool pool(2);
+    GuidingField field(GuidingConfig::neural(), unit_box());
+    CancelFlag cancel;
+    const auto records = record_pass(field, two_lights, 4096, 1);
+    EXPECT_TRUE(field.train(records, pool, &cancel).published);
+    cancel.cancel();
+    const TrainStatistics statistics = field.train(records, pool, &cancel);
+    EXPECT_EQ(statistics.steps, 0u);
+    EXPECT_FALSE(statistics.published);
+    EXPECT_EQ(field.generation(), 1u);
+}
+
 TEST(Field, EmptyAndTinyPassesAreHarmless) {
     ThreadPool pool(2);
     GuidingField field(GuidingConfig::neural(), unit_box());

@@ -23,6 +23,7 @@ TEST(AdaptationStatistics, AKeptGuideDoesNoHarm) {
     settings.frames = 10;
     settings.learned = 16;
     settings.reference = 64;
+    settings.seeds = 1;
     settings.threads = 2;
     const Adaptation result = measure_adaptation(two_rooms(64, 48, 1), settings);
     ASSERT_EQ(result.kept.size(), settings.frames);

@@ -175,6 +175,25 @@ TEST(LiveSession, AViewNeedsNoScene) {
     EXPECT_EQ(finished(session).pixels, first.pixels);
 }
 
+TEST(LiveSession, APictureCanBeWaitedFor) {
+    LiveSession session(2);
+    EXPECT_FALSE(session.wait_picture(kPatience));  // at once: nothing was asked for
+    session.set_scene(versioned_rooms(1 << 20));
+    ASSERT_TRUE(session.wait_picture(kPatience));
+    EXPECT_TRUE(session.progress().has_picture);
+    EXPECT_FALSE(session.picture().pixels.empty());
+    SceneDescription moved = versioned_rooms(1 << 20);
+    moved.camera.to_world[3].x += 0.4f;
+    EXPECT_TRUE(session.set_view(view_of(moved)));
+    EXPECT_FALSE(session.set_view(view_of(moved)));
+    ASSERT_TRUE(session.wait_picture(kPatience));
+    EXPECT_EQ(session.progress().pictures, 2u);
+    session.set_paused(true);
+    EXPECT_TRUE(session.wait(kPatience));
+    session.set_view(view_of(versioned_rooms(1 << 20)));
+    EXPECT_FALSE(session.wait_picture(kPatience));  // at once: it will not be rendered
+}
+
 TEST(LiveSession, NothingStartsAgainWhereNothingChanged) {
     LiveSession session(2);
     session.set_scene(versioned_rooms(2));
