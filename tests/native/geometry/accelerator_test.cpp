@@ -1,5 +1,6 @@
 #include "geometry/accelerator.h"
 
+#include <algorithm>
 #include <chrono>
 #include <new>
 #include <optional>
@@ -128,8 +129,8 @@ TEST(Accelerator, CoherentRaysHitTheSame) {
     }
 }
 
-// Shadow rays in packets of any size say what the nearest hit says: on a closed surface, many of
-// them through its edges and corners, broken rays among them.
+// Shadow rays in batches of any size say what the nearest hit says: on closed surfaces, many of
+// them through edges and corners, broken rays among them.
 TEST(Accelerator, ShadowRaysAgreeWithNearestHits) {
     Random random(21);
     TestGeometry scene;
@@ -167,6 +168,27 @@ TEST(Accelerator, ShadowRaysAgreeWithNearestHits) {
         }
     }
     EXPECT_GT(stopped, rays.size());
+}
+
+// Rays from inside of a closed box to the edges of its triangles, diagonals among them.
+TEST(Accelerator, NoShadowRayPassesThroughACommonEdge) {
+    TestGeometry scene;
+    scene.meshes.push_back(box_mesh("room", Vec3(-2, 0, 0), Vec3(2, 4, 2.5), true));
+    scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+    scene.build();
+    Random random(5);
+    const std::vector<Vec3>& corners = scene.meshes[0].positions;
+    std::vector<Ray> rays;
+    for (int i = 0; i < 200000; ++i) {
+        const UVec3& t = scene.meshes[0].triangles[random.index(12)];
+        const Vec3 to = glm::mix(corners[t.x], corners[i % 2 == 0 ? t.y : t.z], random.uniform());
+        const Vec3 origin(
+            random.uniform(-1.9f, 1.9f), random.uniform(0.1f, 3.9f), random.uniform(0.1f, 2.4f));
+        rays.push_back({origin, glm::normalize(to - origin)});
+    }
+    std::vector<std::uint8_t> occluded(rays.size());
+    scene.accelerator->occluded(rays, occluded);
+    EXPECT_EQ(std::ranges::count(occluded, 1), std::ssize(occluded));
 }
 
 TEST(Accelerator, BarycentricsGiveTheHitPoint) {

@@ -251,7 +251,7 @@ TEST(Network, AdamMatchesItsFormula) {
     std::vector<double> mean(32);
     for (std::uint64_t t = 0; t < 50; ++t) {
         const AdamStep step = adam_schedule(config, t);
-        const double rate = 0.01 * (0.1 + 0.9 * std::exp(-static_cast<double>(t) / 1200.0));
+        const double rate = 0.01 * (0.1 + 0.9 * std::exp(-static_cast<double>(t) / 2400.0));
         const double decay = std::min(0.98, static_cast<double>(t) / static_cast<double>(t + 10));
         for (std::size_t i = 0; i < 32; ++i) {
             gradient[i] = random.uniform(-1.0f, 1.0f);
