@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -27,9 +28,9 @@ NUMBERS = {
     "camera": "Camera.Any*",
     "image": "Texture.Any*",
     "lights": "Lights.Any*",
-    "guiding": "Mixture.Any*:Vmf.PdfError*",
+    "guiding": "Mixture.Any*:Vmf.PdfError*:Field.Attacks*",
     "materials": "Robustness.Million*:ProgramCompile.Random*",
-    "session": "Scaling.*",
+    "session": "Scaling.*:WelchStatistics.Huge*",
 }
 
 
@@ -70,6 +71,19 @@ def run(table: Table, attack: str, name: str, command: list, timeout: float, **v
         table.add(attack, f"{name}: ended with {code}", "1", 0 if code == 0 else 1, 0)
 
 
+def tests_row(table: Table, attack: str, what: str, command: list, timeout: float = 600) -> None:
+    """A row of a program that counts its tests, ours or GoogleTest's."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
+                          errors="replace", check=False, timeout=timeout)
+    text = done.stdout + done.stderr
+    (LOGS / f"{attack}_{what.split()[0]}.log").write_text(text, encoding="utf-8")
+    passed, failed = (
+        int(found[-1]) if (found := re.findall(pattern, text)) else 0
+        for pattern in (r"(?:PASSED  \] )?(\d+) (?:passed|tests?\.$)", r"(\d+) (?:failed|FAILED)"))
+    wrong = max(failed, int(done.returncode != 0 or passed == 0))
+    table.add(attack, f"{what}: tests that fail", str(passed + failed), wrong, 0)
+
+
 def gtest(table: Table, attack: str, module: str, tests: str, **variables) -> None:
     command = [NATIVE / f"{module}_test", f"--gtest_filter={tests}", "--gtest_brief=1"]
     run(table, attack, module, command, 1500, **variables)
@@ -81,11 +95,19 @@ def numbers(table: Table) -> None:
 
 
 def kills(table: Table) -> None:
-    gtest(table, "kills", "session", "Checkpoint.Survives*", PHAROS_KILLS="100")
+    gtest(table, "kills", "session", "Checkpoint.Survives*:Checkpoint.Resumed*",
+          PHAROS_KILLS="100")
+
+
+def shards(table: Table) -> None:
+    gtest(table, "shards", "session", "Shards.*", PHAROS_LONG_TESTS="1")
+    if shutil.which("slurmctld", path=f"{os.environ['PATH']}:/usr/sbin"):
+        tests_row(table, "shards", "slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
 
 
 def sizes(table: Table) -> None:
     gtest(table, "sizes", "session", "LargeScenes.*", PHAROS_LONG_TESTS="1")
+    blender_script(table, "sizes", "test_sizes.py", PHAROS_LONG_TESTS="1")
 
 
 def many(table: Table) -> None:
@@ -156,6 +178,7 @@ def window_script(table: Table, attack: str, script: str) -> None:
 
 def soak(table: Table) -> None:
     blender_script(table, "soak", "test_soak.py", PHAROS_SOAK="1")
+    blender_script(table, "soak", "test_float_state.py")
     blender_script(table, "soak", "test_robustness.py")
     window_script(table, "soak", "test_interruptions.py")
 
@@ -309,6 +332,27 @@ def exits(table: Table) -> None:
                 wrong.append(f"{code} for {expected}")
         table.add("exits", f"exit codes that are others {wrong or ''}", str(len(cases)),
                   len(wrong), 0)
+    tests_row(table, "exits", "scenes/render, its codes and signals",
+              ["bash", ROOT / "tests" / "render_command.sh"], 1200)
+
+
+SECURITY = (
+    ("image", "image files: what they are, sizes, bombs, links",
+     "ImageIo.*Refused*:ImageIo.Writing*:ImageIo.Bytes*:ImageIo.TheName*:ImageIo.*NeverCrash"),
+    ("core", "state files: damage at every byte, links", "StateFile.*:AtomicFile.*"),
+    ("guiding", "weights: cut, damaged, of another network", "Field.BrokenFiles*"),
+    ("scene", "dumps: cut, damaged, counts beyond the end", "Dump.*"),
+)
+
+
+def security(table: Table) -> None:
+    """What files may say. That nothing of a .blend is run or written: `exits`."""
+    for module, what, tests in SECURITY:
+        tests_row(table, "security", what,
+                  [NATIVE / f"{module}_test", f"--gtest_filter={tests}"])
+    tests_row(table, "security", "add-on: no code, no pickles, no shell; scripts stay off",
+              [ROOT / "build" / "bpy" / "bin" / "python", "-m", "pytest", "-q",
+               ROOT / "tests" / "python" / "test_hygiene.py", "-k", "runs or scripts"])
 
 
 def scenes(table: Table) -> None:
@@ -352,8 +396,8 @@ def fuzz(table: Table, seconds: int) -> None:
                   int(done.returncode != 0), 0)
 
 
-ATTACKS = {f.__name__: f for f in (numbers, kills, sizes, many, cancel, soak, memory, exits,
-                                   scenes)}
+ATTACKS = {f.__name__: f for f in (numbers, kills, shards, sizes, many, cancel, soak, memory,
+                                   exits, scenes, security)}
 
 
 def main() -> int:
