@@ -14,6 +14,7 @@
 #include "support/scratch.h"
 #include "support/stress.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -21,22 +22,17 @@ namespace {
 using namespace pharos::testing;
 using test::Random;
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-// From the wish to end until nothing is left of the session: what a host waits for.
+// From the wish to end until nothing is left of the session: what a host waits for. Of the wall
+// clock and the CPU time of the process the smaller: what other programs took does not count.
 double cancelled_after(const SceneDescription& d, double seconds) {
     std::optional<RenderSession> session(std::in_place, d, thread_count());
     static_cast<void>(session->wait(std::chrono::milliseconds(static_cast<long>(1e3 * seconds))));
-    const auto begin = Clock::now();
+    const Stopwatch since_cancel;
     session->cancel();
     EXPECT_TRUE(session->wait(std::chrono::milliseconds(60000)));
     EXPECT_EQ(session->progress().state, SessionState::Cancelled);
     session.reset();
-    return seconds_since(begin);
+    return since_cancel.seconds();
 }
 
 void expect_soon(const std::string& what, std::vector<double> seconds) {

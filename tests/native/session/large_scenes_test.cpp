@@ -14,6 +14,7 @@
 #include "support/scratch.h"
 #include "support/stress.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -34,10 +35,9 @@ void add_floor_and_camera(SceneBuilder& builder,
 
 // Renders, and says how long all of it took.
 void expect_picture(const char* what, std::uint64_t count, SceneDescription d) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch since_start;
     const Rendered result = render(std::move(d), 2);
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double seconds = since_start.seconds();
     ASSERT_EQ(result.progress.state, SessionState::Finished) << result.progress.error;
     EXPECT_EQ(result.progress.nonfinite_samples, 0u);
     EXPECT_TRUE(std::isfinite(result.mean(0)));
