@@ -54,33 +54,36 @@ class Table:
         return len(rows)
 
 
-def run(table: Table, attack: str, name: str, command: list, timeout: float, **variables) -> None:
-    """A program's rows; one more where it failed or said nothing."""
+def finish(log: str, command: list, timeout: float, variables: dict | None = None) -> tuple:
+    """What a program said, kept as a log, and how it ended."""
     try:
         done = subprocess.run(
-            [str(word) for word in command], env={**os.environ, **variables}, timeout=timeout,
-            capture_output=True, text=True, errors="replace", check=False,
+            [str(word) for word in command], env={**os.environ, **(variables or {})},
+            timeout=timeout, capture_output=True, text=True, errors="replace", check=False,
             start_new_session=True)
         text, code = done.stdout + done.stderr, done.returncode
     except subprocess.TimeoutExpired as expired:
         text = "".join(part.decode(errors="replace") for part in (expired.stdout, expired.stderr)
                        if part)
         code = "no end"
-    (LOGS / f"{attack}_{name}.log").write_text(text, encoding="utf-8")
+    (LOGS / f"{log}.log").write_text(text, encoding="utf-8")
+    return text, code
+
+
+def run(table: Table, attack: str, name: str, command: list, timeout: float, **variables) -> None:
+    """A program's rows; one more where it failed or said nothing."""
+    text, code = finish(f"{attack}_{name}", command, timeout, variables)
     if table.take(attack, text) == 0 or code != 0:
         table.add(attack, f"{name}: ended with {code}", "1", 0 if code == 0 else 1, 0)
 
 
 def tests_row(table: Table, attack: str, what: str, command: list, timeout: float = 600) -> None:
     """A row of a program that counts its tests, ours or GoogleTest's."""
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
-                          errors="replace", check=False, timeout=timeout)
-    text = done.stdout + done.stderr
-    (LOGS / f"{attack}_{what.split()[0]}.log").write_text(text, encoding="utf-8")
+    text, code = finish(f"{attack}_{what.split()[0].strip(',:')}", command, timeout)
     passed, failed = (
-        int(found[-1]) if (found := re.findall(pattern, text)) else 0
+        int(found[-1]) if (found := re.findall(pattern, text, re.MULTILINE)) else 0
         for pattern in (r"(?:PASSED  \] )?(\d+) (?:passed|tests?\.$)", r"(\d+) (?:failed|FAILED)"))
-    wrong = max(failed, int(done.returncode != 0 or passed == 0))
+    wrong = max(failed, int(code != 0 or passed == 0))
     table.add(attack, f"{what}: tests that fail", str(passed + failed), wrong, 0)
 
 
@@ -102,7 +105,7 @@ def kills(table: Table) -> None:
 def shards(table: Table) -> None:
     gtest(table, "shards", "session", "Shards.*", PHAROS_LONG_TESTS="1")
     if shutil.which("slurmctld", path=f"{os.environ['PATH']}:/usr/sbin"):
-        tests_row(table, "shards", "slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
+        tests_row(table, "shards", "Slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
 
 
 def sizes(table: Table) -> None:
@@ -332,23 +335,23 @@ def exits(table: Table) -> None:
                 wrong.append(f"{code} for {expected}")
         table.add("exits", f"exit codes that are others {wrong or ''}", str(len(cases)),
                   len(wrong), 0)
-    tests_row(table, "exits", "scenes/render, its codes and signals",
+    tests_row(table, "exits", "codes and signals of scenes/render",
               ["bash", ROOT / "tests" / "render_command.sh"], 1200)
 
 
 SECURITY = (
-    ("image", "image files: what they are, sizes, bombs, links",
+    ("image", "files that are none, sizes, bombs, links",
      "ImageIo.*Refused*:ImageIo.Writing*:ImageIo.Bytes*:ImageIo.TheName*:ImageIo.*NeverCrash"),
-    ("core", "state files: damage at every byte, links", "StateFile.*:AtomicFile.*"),
-    ("guiding", "weights: cut, damaged, of another network", "Field.BrokenFiles*"),
-    ("scene", "dumps: cut, damaged, counts beyond the end", "Dump.*"),
+    ("core", "damage at every byte, links", "StateFile.*:AtomicFile.*"),
+    ("guiding", "weights cut, damaged, of another network", "Field.BrokenFiles*"),
+    ("scene", "dumps cut, damaged, counts beyond the end", "Dump.*"),
 )
 
 
 def security(table: Table) -> None:
     """What files may say. That nothing of a .blend is run or written: `exits`."""
     for module, what, tests in SECURITY:
-        tests_row(table, "security", what,
+        tests_row(table, "security", f"{module}: {what}",
                   [NATIVE / f"{module}_test", f"--gtest_filter={tests}"])
     tests_row(table, "security", "add-on: no code, no pickles, no shell; scripts stay off",
               [ROOT / "build" / "bpy" / "bin" / "python", "-m", "pytest", "-q",
