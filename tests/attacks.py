@@ -103,7 +103,8 @@ def kills(table: Table) -> None:
 
 
 def shards(table: Table) -> None:
-    gtest(table, "shards", "session", "Shards.*", PHAROS_LONG_TESTS="1")
+    tests_row(table, "shards", "uneven, guided and foreign parts of a frame, within 1e-6",
+              [NATIVE / "session_test", "--gtest_filter=Shards.*"])
     if shutil.which("slurmctld", path=f"{os.environ['PATH']}:/usr/sbin"):
         tests_row(table, "shards", "Slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
 
