@@ -103,8 +103,7 @@ def kills(table: Table) -> None:
 
 
 def shards(table: Table) -> None:
-    tests_row(table, "shards", "uneven, guided and foreign parts of a frame, within 1e-6",
-              [NATIVE / "session_test", "--gtest_filter=Shards.*"])
+    gtest(table, "shards", "session", "Shards.*", PHAROS_LONG_TESTS="1")
     if shutil.which("slurmctld", path=f"{os.environ['PATH']}:/usr/sbin"):
         tests_row(table, "shards", "Slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
 
