@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -27,9 +28,9 @@ NUMBERS = {
     "camera": "Camera.Any*",
     "image": "Texture.Any*",
     "lights": "Lights.Any*",
-    "guiding": "Mixture.Any*:Vmf.PdfError*",
+    "guiding": "Mixture.Any*:Vmf.PdfError*:Field.Attacks*",
     "materials": "Robustness.Million*:ProgramCompile.Random*",
-    "session": "Scaling.*",
+    "session": "Scaling.*:WelchStatistics.Huge*",
 }
 
 
@@ -53,21 +54,37 @@ class Table:
         return len(rows)
 
 
-def run(table: Table, attack: str, name: str, command: list, timeout: float, **variables) -> None:
-    """A program's rows; one more where it failed or said nothing."""
+def finish(log: str, command: list, timeout: float, variables: dict | None = None) -> tuple:
+    """What a program said, kept as a log, and how it ended."""
     try:
         done = subprocess.run(
-            [str(word) for word in command], env={**os.environ, **variables}, timeout=timeout,
-            capture_output=True, text=True, errors="replace", check=False,
+            [str(word) for word in command], env={**os.environ, **(variables or {})},
+            timeout=timeout, capture_output=True, text=True, errors="replace", check=False,
             start_new_session=True)
         text, code = done.stdout + done.stderr, done.returncode
     except subprocess.TimeoutExpired as expired:
         text = "".join(part.decode(errors="replace") for part in (expired.stdout, expired.stderr)
                        if part)
         code = "no end"
-    (LOGS / f"{attack}_{name}.log").write_text(text, encoding="utf-8")
+    (LOGS / f"{log}.log").write_text(text, encoding="utf-8")
+    return text, code
+
+
+def run(table: Table, attack: str, name: str, command: list, timeout: float, **variables) -> None:
+    """A program's rows; one more where it failed or said nothing."""
+    text, code = finish(f"{attack}_{name}", command, timeout, variables)
     if table.take(attack, text) == 0 or code != 0:
         table.add(attack, f"{name}: ended with {code}", "1", 0 if code == 0 else 1, 0)
+
+
+def tests_row(table: Table, attack: str, what: str, command: list, timeout: float = 600) -> None:
+    """A row of a program that counts its tests, ours or GoogleTest's."""
+    text, code = finish(f"{attack}_{what.split()[0].strip(',:')}", command, timeout)
+    passed, failed = (
+        int(found[-1]) if (found := re.findall(pattern, text, re.MULTILINE)) else 0
+        for pattern in (r"(?:PASSED  \] )?(\d+) (?:passed|tests?\.$)", r"(\d+) (?:failed|FAILED)"))
+    wrong = max(failed, int(code != 0 or passed == 0))
+    table.add(attack, f"{what}: tests that fail", str(passed + failed), wrong, 0)
 
 
 def gtest(table: Table, attack: str, module: str, tests: str, **variables) -> None:
@@ -81,11 +98,19 @@ def numbers(table: Table) -> None:
 
 
 def kills(table: Table) -> None:
-    gtest(table, "kills", "session", "Checkpoint.Survives*", PHAROS_KILLS="100")
+    gtest(table, "kills", "session", "Checkpoint.Survives*:Checkpoint.Resumed*",
+          PHAROS_KILLS="100")
+
+
+def shards(table: Table) -> None:
+    gtest(table, "shards", "session", "Shards.*", PHAROS_LONG_TESTS="1")
+    if shutil.which("slurmctld", path=f"{os.environ['PATH']}:/usr/sbin"):
+        tests_row(table, "shards", "Slurm's job arrays", ["bash", ROOT / "tests" / "slurm.sh"])
 
 
 def sizes(table: Table) -> None:
     gtest(table, "sizes", "session", "LargeScenes.*", PHAROS_LONG_TESTS="1")
+    blender_script(table, "sizes", "test_sizes.py", PHAROS_LONG_TESTS="1")
 
 
 def many(table: Table) -> None:
@@ -156,6 +181,7 @@ def window_script(table: Table, attack: str, script: str) -> None:
 
 def soak(table: Table) -> None:
     blender_script(table, "soak", "test_soak.py", PHAROS_SOAK="1")
+    blender_script(table, "soak", "test_float_state.py")
     blender_script(table, "soak", "test_robustness.py")
     window_script(table, "soak", "test_interruptions.py")
 
@@ -309,6 +335,27 @@ def exits(table: Table) -> None:
                 wrong.append(f"{code} for {expected}")
         table.add("exits", f"exit codes that are others {wrong or ''}", str(len(cases)),
                   len(wrong), 0)
+    tests_row(table, "exits", "codes and signals of scenes/render",
+              ["bash", ROOT / "tests" / "render_command.sh"], 1200)
+
+
+SECURITY = (
+    ("image", "files that are none, sizes, bombs, links",
+     "ImageIo.*Refused*:ImageIo.Writing*:ImageIo.Bytes*:ImageIo.TheName*:ImageIo.*NeverCrash"),
+    ("core", "damage at every byte, links", "StateFile.*:AtomicFile.*"),
+    ("guiding", "weights cut, damaged, of another network", "Field.BrokenFiles*"),
+    ("scene", "dumps cut, damaged, counts beyond the end", "Dump.*"),
+)
+
+
+def security(table: Table) -> None:
+    """What files may say. That nothing of a .blend is run or written: `exits`."""
+    for module, what, tests in SECURITY:
+        tests_row(table, "security", f"{module}: {what}",
+                  [NATIVE / f"{module}_test", f"--gtest_filter={tests}"])
+    tests_row(table, "security", "add-on: no code, no pickles, no shell; scripts stay off",
+              [ROOT / "build" / "bpy" / "bin" / "python", "-m", "pytest", "-q",
+               ROOT / "tests" / "python" / "test_hygiene.py", "-k", "runs or scripts"])
 
 
 def scenes(table: Table) -> None:
@@ -352,8 +399,8 @@ def fuzz(table: Table, seconds: int) -> None:
                   int(done.returncode != 0), 0)
 
 
-ATTACKS = {f.__name__: f for f in (numbers, kills, sizes, many, cancel, soak, memory, exits,
-                                   scenes)}
+ATTACKS = {f.__name__: f for f in (numbers, kills, shards, sizes, many, cancel, soak, memory,
+                                   exits, scenes, security)}
 
 
 def main() -> int:

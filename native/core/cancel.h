@@ -22,4 +22,10 @@ class Cancelled : public std::runtime_error {
     Cancelled() : std::runtime_error("cancelled") {}
 };
 
+inline void throw_if_cancelled(const CancelFlag& cancel) {
+    if (cancel.cancelled()) {
+        throw Cancelled();
+    }
+}
+
 }  // namespace pharos

@@ -161,12 +161,6 @@ ScenePtr make_scene(EmbreeDevice& device) {
     return scene;
 }
 
-void throw_if_cancelled(const CancelFlag& cancel) {
-    if (cancel.cancelled()) {
-        throw Cancelled();
-    }
-}
-
 void throw_if_failed(const EmbreeDevice& device, RTCError error) {
     switch (error) {
         case RTC_ERROR_NONE:

@@ -50,8 +50,6 @@ struct EmbreeDevice {
 
 [[nodiscard]] ScenePtr make_scene(EmbreeDevice& device);
 
-void throw_if_cancelled(const CancelFlag& cancel);
-
 // Throws what an error of Embree means to a build: std::bad_alloc where the memory was refused.
 void throw_if_failed(const EmbreeDevice& device, RTCError error);
 

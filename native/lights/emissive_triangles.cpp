@@ -17,6 +17,7 @@ constexpr float kFlatCosine = 0.999f;
 constexpr float kFacingDistance = 2.5f;
 constexpr std::size_t kMaxFacingGroups = 64;  // memory: beyond, the choice among groups must do
 constexpr std::uint32_t kClusterTriangles = 16;
+constexpr std::size_t kCancelPollInterval = 1u << 16;
 
 Vec3 unit_normal(const Vec3& e1, const Vec3& e2) {
     return normalize_or(glm::cross(glm::normalize(e1), glm::normalize(e2)), Vec3(0.0f));
@@ -54,10 +55,11 @@ std::uint32_t material_of(const Mesh& mesh, const Instance& instance, std::uint3
 
 }  // namespace
 
-EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input) {
-    collect(input);
-    split_groups(input);
+EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input, const CancelFlag& cancel) {
+    collect(input, cancel);
+    split_groups(input, cancel);
     for (Group& group : groups_) {
+        throw_if_cancelled(cancel);
         finish_group(group);
         if (groups_.size() <= kMaxFacingGroups) {
             add_facing_tables(group);
@@ -78,9 +80,13 @@ EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input) {
 }
 
 // World-space triangles that can be sampled, sorted by group; groups in order of first appearance.
-void EmissiveTriangles::collect(const LightSamplerInput& input) {
+void EmissiveTriangles::collect(const LightSamplerInput& input, const CancelFlag& cancel) {
     std::unordered_map<std::uint64_t, std::uint32_t> group_of;
-    for (const EmissiveTriangle& emitter : input.triangles) {
+    for (std::size_t i = 0; i < input.triangles.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
+        const EmissiveTriangle& emitter = input.triangles[i];
         if (emitter.instance >= input.instances.size()) {
             continue;
         }
@@ -160,16 +166,17 @@ bool EmissiveTriangles::is_closed_group(const LightSamplerInput& input, const Gr
 }
 
 // Closed groups stay whole as long as facing tables serve them.
-void EmissiveTriangles::split_groups(const LightSamplerInput& input) {
+void EmissiveTriangles::split_groups(const LightSamplerInput& input, const CancelFlag& cancel) {
     const std::vector<Group> whole = std::move(groups_);
     groups_.clear();
     for (const Group& group : whole) {
+        throw_if_cancelled(cancel);
         const bool closed = is_closed_group(input, group);
         if (group.count <= kClusterTriangles || (closed && whole.size() <= kMaxFacingGroups)) {
             groups_.push_back(group);
             groups_.back().closed = closed;
         } else {
-            split_range(group.first, group.count, group.material);
+            split_range(group.first, group.count, group.material, cancel);
         }
     }
     for (std::uint32_t index = 0; index < groups_.size(); ++index) {
@@ -182,7 +189,9 @@ void EmissiveTriangles::split_groups(const LightSamplerInput& input) {
 // Halves along the longest axis until a cluster is left; reorders the triangles.
 void EmissiveTriangles::split_range(std::uint32_t first,
                                     std::uint32_t count,
-                                    std::uint32_t material) {
+                                    std::uint32_t material,
+                                    const CancelFlag& cancel) {
+    throw_if_cancelled(cancel);
     if (count <= kClusterTriangles) {
         Group cluster;
         cluster.first = first;
@@ -207,8 +216,8 @@ void EmissiveTriangles::split_range(std::uint32_t first,
         return x != y ? x < y
                       : std::pair(a.instance, a.triangle) < std::pair(b.instance, b.triangle);
     });
-    split_range(first, half, material);
-    split_range(first + half, count - half, material);
+    split_range(first, half, material, cancel);
+    split_range(first + half, count - half, material, cancel);
 }
 
 void EmissiveTriangles::add_facing_tables(Group& group) {

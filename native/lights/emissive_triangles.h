@@ -22,7 +22,8 @@ namespace pharos {
 class EmissiveTriangles {
   public:
     EmissiveTriangles() = default;
-    explicit EmissiveTriangles(const LightSamplerInput& input);
+    // Throws Cancelled.
+    EmissiveTriangles(const LightSamplerInput& input, const CancelFlag& cancel);
 
     [[nodiscard]] std::uint32_t group_count() const {
         return static_cast<std::uint32_t>(groups_.size());
@@ -91,9 +92,12 @@ class EmissiveTriangles {
         FacingTables facing;  // of a closed group, if there are not too many
     };
 
-    void collect(const LightSamplerInput& input);
-    void split_groups(const LightSamplerInput& input);
-    void split_range(std::uint32_t first, std::uint32_t count, std::uint32_t material);
+    void collect(const LightSamplerInput& input, const CancelFlag& cancel);
+    void split_groups(const LightSamplerInput& input, const CancelFlag& cancel);
+    void split_range(std::uint32_t first,
+                     std::uint32_t count,
+                     std::uint32_t material,
+                     const CancelFlag& cancel);
     void finish_group(Group& group);
     [[nodiscard]] bool is_closed_group(const LightSamplerInput& input, const Group& group) const;
     void add_facing_tables(Group& group);

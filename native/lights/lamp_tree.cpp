@@ -49,19 +49,20 @@ Bounds3 lamp_bounds(const Lamp& lamp) {
     return bounds;
 }
 
-LampTree::LampTree(std::span<const Lamp> lamps) : lamps_(lamps) {
+LampTree::LampTree(std::span<const Lamp> lamps, const CancelFlag& cancel) : lamps_(lamps) {
     for (std::uint32_t i = 0; i < lamps.size(); ++i) {
         if (lamps[i].hittable && !is_distant(lamps[i])) {
             order_.push_back(i);
         }
     }
     if (order_.size() > kFewLamps) {
-        build(order_);
+        build(order_, cancel);
     }
 }
 
 // Returns the new node's index. Median splits of the longest axis of the centres.
-std::uint32_t LampTree::build(std::span<std::uint32_t> order) {
+std::uint32_t LampTree::build(std::span<std::uint32_t> order, const CancelFlag& cancel) {
+    throw_if_cancelled(cancel);
     const auto index = static_cast<std::uint32_t>(nodes_.size());
     nodes_.emplace_back();
     for (auto& plane : nodes_[index].planes) {
@@ -84,7 +85,7 @@ std::uint32_t LampTree::build(std::span<std::uint32_t> order) {
     for (std::size_t child = 0; child < parts.size(); ++child) {
         set_box(index, child, parts[child]);
         const std::uint32_t entry =
-            parts[child].size() == 1 ? (parts[child][0] | kLeaf) : build(parts[child]);
+            parts[child].size() == 1 ? (parts[child][0] | kLeaf) : build(parts[child], cancel);
         nodes_[index].children[child] = entry;
     }
     return index;

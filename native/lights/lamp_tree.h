@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "lights/lamp.h"
 #include "lights/light_sampler.h"
 
@@ -20,8 +21,8 @@ class LampTree {
     LampTree() = default;
 
     // Over the hittable local lamps of `lamps`, which must outlive the tree and stay where they
-    // are.
-    explicit LampTree(std::span<const Lamp> lamps);
+    // are. Throws Cancelled.
+    explicit LampTree(std::span<const Lamp> lamps, const CancelFlag& cancel = {});
 
     [[nodiscard]] bool empty() const { return order_.empty(); }
 
@@ -50,7 +51,7 @@ class LampTree {
     struct Slabs;
     struct Search;
 
-    std::uint32_t build(std::span<std::uint32_t> order);
+    std::uint32_t build(std::span<std::uint32_t> order, const CancelFlag& cancel);
     void set_box(std::uint32_t node, std::size_t child, std::span<const std::uint32_t> order);
     void prefetch(std::uint32_t node) const;
     void meet(std::uint32_t lamp, const LightSampleContext* context, Search& search) const;

@@ -16,6 +16,7 @@ namespace pharos {
 namespace {
 
 constexpr float kFaintest = 0.05f;
+constexpr std::uint32_t kCancelPollInterval = 1u << 14;
 
 // A constant world has nothing to aim at: scattered rays find it with the cosine in their density,
 // and a second technique would only add its noise (MIS compensation, Karlik et al. 2019, gives it
@@ -106,8 +107,13 @@ LightHit LightSampler::Impl::finish_hit(const LampHit& hit,
 }
 
 LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_unique<Impl>()) {
+    const CancelFlag never;
+    const CancelFlag& cancel = input.cancel != nullptr ? *input.cancel : never;
     std::vector<LightBound> bounds;
     for (std::uint32_t i = 0; i < input.lamps.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
         if (input.lamps[i].is_portal) {
             impl_->portals.add(input.lamps[i]);
             continue;
@@ -124,7 +130,7 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
             }
         }
     }
-    impl_->triangles = EmissiveTriangles(input);
+    impl_->triangles = EmissiveTriangles(input, cancel);
     for (std::uint32_t group = 0; group < impl_->triangles.group_count(); ++group) {
         bounds.push_back(impl_->triangles.bound(group));
     }
@@ -132,8 +138,8 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
         impl_->environment = input.environment;
         bounds.push_back(bound_environment(*input.environment));
     }
-    impl_->selection = LightSelection(bounds);
-    impl_->tree = LampTree(impl_->lamps);
+    impl_->selection = LightSelection(bounds, cancel);
+    impl_->tree = LampTree(impl_->lamps, cancel);
 }
 
 LightSampler::~LightSampler() = default;

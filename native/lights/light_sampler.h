@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "core/math.h"
 #include "geometry/accelerator.h"
 #include "geometry/mesh.h"
@@ -35,6 +36,7 @@ struct LightSamplerInput {
     std::span<const Instance> instances;
     // Null, black, or constant without portals: not sampled.
     const EnvironmentLight* environment = nullptr;
+    const CancelFlag* cancel = nullptr;  // polled where it is not null; Cancelled is thrown
 };
 
 // A sample on an emissive triangle or the world still needs its radiance from a node program.

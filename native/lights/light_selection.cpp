@@ -2,10 +2,10 @@
 
 namespace pharos {
 
-LightSelection::LightSelection(std::span<const LightBound> bounds)
+LightSelection::LightSelection(std::span<const LightBound> bounds, const CancelFlag& cancel)
     : count_(static_cast<std::uint32_t>(bounds.size())) {
     if (count_ > kMaxEstimated) {
-        tree_ = LightTree(bounds);
+        tree_ = LightTree(bounds, cancel);
         return;
     }
     for (std::size_t i = 0; i < count_; ++i) {

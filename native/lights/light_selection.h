@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/cancel.h"
 #include "lights/light_columns.h"
 #include "lights/light_tree.h"
 
@@ -19,7 +20,8 @@ class LightSelection {
     static constexpr std::uint32_t kMaxEstimated = 32;
 
     LightSelection() = default;
-    explicit LightSelection(std::span<const LightBound> bounds);
+    // Throws Cancelled.
+    explicit LightSelection(std::span<const LightBound> bounds, const CancelFlag& cancel = {});
 
     [[nodiscard]] bool empty() const { return count_ == 0; }
 

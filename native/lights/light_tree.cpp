@@ -152,7 +152,9 @@ LightChoice choose_in_proportion(std::span<const float> weights, float sum, doub
     return choice;
 }
 
-LightTree::LightTree(std::span<const LightBound> bounds) : slot_(bounds.size()) {
+LightTree::LightTree(std::span<const LightBound> bounds, const CancelFlag& cancel)
+    : slot_(bounds.size()) {
+    const Input input{bounds, cancel};
     // Distances mean nothing to distant lights: the two kinds meet at the root only.
     std::vector<std::uint32_t> order(bounds.size());
     std::iota(order.begin(), order.end(), 0u);
@@ -162,21 +164,22 @@ LightTree::LightTree(std::span<const LightBound> bounds) : slot_(bounds.size()) 
     const auto local = static_cast<std::size_t>(middle - order.begin());
     const std::array<Order, 2> parts = {Order(order).first(local), Order(order).subspan(local)};
     if (parts[0].empty() || parts[1].empty()) {
-        build(bounds, order, {});
+        build(input, order, {});
         return;
     }
     nodes_.emplace_back();
     std::vector<LightBound> merged;
     for (std::uint32_t entry = 0; entry < 2; ++entry) {
         merged.push_back(merge_bounds(members_of(bounds, parts[entry])));
-        const std::uint32_t child = build(bounds, parts[entry], {kRoot, entry});
+        const std::uint32_t child = build(input, parts[entry], {kRoot, entry});
         nodes_[kRoot].children[entry] = child;
     }
     set_bounds(nodes_[kRoot], merged);
 }
 
 // Returns the index of the new node.
-std::uint32_t LightTree::build(std::span<const LightBound> bounds, Order order, Slot parent) {
+std::uint32_t LightTree::build(const Input& input, Order order, Slot parent) {
+    const std::span<const LightBound> bounds = input.bounds;
     const auto index = static_cast<std::uint32_t>(nodes_.size());
     nodes_.emplace_back();
     nodes_[index].parent = parent;
@@ -186,6 +189,7 @@ std::uint32_t LightTree::build(std::span<const LightBound> bounds, Order order, 
         if (largest->size() < 2) {
             break;
         }
+        throw_if_cancelled(input.cancel);
         const Order whole = *largest;
         const std::size_t left = split(bounds, whole);
         *largest = whole.first(left);
@@ -201,7 +205,7 @@ std::uint32_t LightTree::build(std::span<const LightBound> bounds, Order order, 
             continue;
         }
         merged.push_back(merge_bounds(members_of(bounds, part)));
-        const std::uint32_t child = build(bounds, part, {index, entry});
+        const std::uint32_t child = build(input, part, {index, entry});
         nodes_[index].children[entry] = child;
     }
     set_bounds(nodes_[index], merged);

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "lights/lean_columns.h"
 #include "lights/light_columns.h"
 
@@ -21,7 +22,8 @@ namespace pharos {
 class LightTree {
   public:
     LightTree() = default;
-    explicit LightTree(std::span<const LightBound> bounds);
+    // Throws Cancelled.
+    explicit LightTree(std::span<const LightBound> bounds, const CancelFlag& cancel = {});
 
     [[nodiscard]] bool empty() const { return nodes_.empty(); }
 
@@ -56,9 +58,12 @@ class LightTree {
         double pmf = 1.0;
     };
 
-    std::uint32_t build(std::span<const LightBound> bounds,
-                        std::span<std::uint32_t> order,
-                        Slot parent);
+    struct Input {
+        std::span<const LightBound> bounds;
+        const CancelFlag& cancel;
+    };
+
+    std::uint32_t build(const Input& input, std::span<std::uint32_t> order, Slot parent);
     [[nodiscard]] std::uint32_t choose_child(const LightSampleContext& context, Descent& at) const;
     void prefetch(std::uint32_t node) const;
     void set_bounds(Node& node, std::span<const LightBound> bounds);

@@ -19,6 +19,8 @@ namespace pharos {
 
 namespace {
 
+constexpr std::size_t kCancelPollInterval = 1u << 14;
+
 // Grey diffuse, for faces without a material.
 NodeProgram default_program() {
     NodeProgram program;
@@ -80,11 +82,7 @@ class SceneBuild {
     }
 
   private:
-    void poll() const {
-        if (cancel_.cancelled()) {
-            throw Cancelled();
-        }
-    }
+    void poll() const { throw_if_cancelled(cancel_); }
 
     void mend_meshes();
     void mend();
@@ -124,8 +122,14 @@ void SceneBuild::mend_meshes() {
 void SceneBuild::mend() {
     SceneDescription& d = scene_->description;
     const auto default_material = static_cast<std::uint32_t>(d.materials.size());
+    for (InstanceAttribute& attribute : d.instance_attributes) {
+        attribute.values.resize(d.instances.size(), Vec4(0.0f));
+    }
     const bool wants_index = (d.passes.wanted & pass_bit(FilmPass::ObjectIndex)) != 0;
     for (std::size_t i = 0; i < d.instances.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            poll();
+        }
         auto mended = mend_instance(d, d.instances[i], default_material, report_);
         if (mended && !d.meshes[mended->mesh].triangles.empty()) {
             scene_->instances.push_back(std::move(*mended));
@@ -136,11 +140,11 @@ void SceneBuild::mend() {
             // Values of attributes move up with their instances.
             const std::size_t place = scene_->instances.size() - 1;
             for (InstanceAttribute& attribute : d.instance_attributes) {
-                attribute.values.resize(d.instances.size(), Vec4(0.0f));
                 attribute.values[place] = attribute.values[i];
             }
         }
     }
+    poll();
     scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances, pieces_ != nullptr);
     mend_lamps(d.lights, report_);
     mend_camera(d, report_);
@@ -207,6 +211,7 @@ void SceneBuild::compile_materials() {
     const SceneDescription& d = scene_->description;
     scene_->materials.reserve(d.materials.size() + 1);
     for (const MaterialDescription& material : d.materials) {
+        poll();
         scene_->materials.push_back(
             compile_material(material.name, material.program, report_, scene_->textures));
         scene_->materials.back().emission_sampling = material.emission_sampling;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <span>
 #include <utility>
 
 namespace pharos {
@@ -10,6 +11,14 @@ namespace pharos {
 namespace {
 
 constexpr float kFlat = 0.9999f;  // cosine of a corner's normal to its face's
+constexpr std::size_t kCancelPollInterval = 1u << 16;
+constexpr std::size_t kBatch = 1u << 14;  // vertices whose programs run between two polls
+
+void poll(const CancelFlag& cancel, std::size_t i) {
+    if (i % kCancelPollInterval == 0) {
+        throw_if_cancelled(cancel);
+    }
+}
 
 [[nodiscard]] Vec3 face_normal(const Mesh& mesh, const UVec3& t) {
     const Vec3& a = mesh.positions[t.x];
@@ -17,9 +26,11 @@ constexpr float kFlat = 0.9999f;  // cosine of a corner's normal to its face's
 }
 
 // Means over the faces around each vertex; a vertex without any has none.
-[[nodiscard]] std::vector<Vec3> mean_normals(const Mesh& mesh) {
+[[nodiscard]] std::vector<Vec3> mean_normals(const Mesh& mesh, const CancelFlag& cancel) {
     std::vector<Vec3> normals(mesh.positions.size(), Vec3(0.0f));
-    for (const UVec3& t : mesh.triangles) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        poll(cancel, i);
+        const UVec3& t = mesh.triangles[i];
         const Vec3 n = face_normal(mesh, t);
         for (int k = 0; k < 3; ++k) {
             normals[t[k]] += n;
@@ -31,15 +42,16 @@ constexpr float kFlat = 0.9999f;  // cosine of a corner's normal to its face's
     return normals;
 }
 
-[[nodiscard]] std::vector<Vec3> smooth_normals(const Mesh& mesh) {
-    return mesh.normal_domain == NormalDomain::Vertex ? mesh.normals : mean_normals(mesh);
+[[nodiscard]] std::vector<Vec3> smooth_normals(const Mesh& mesh, const CancelFlag& cancel) {
+    return mesh.normal_domain == NormalDomain::Vertex ? mesh.normals : mean_normals(mesh, cancel);
 }
 
 // Which corners are shaded flat, before vertices move.
-[[nodiscard]] std::vector<std::uint8_t> flat_corners(const Mesh& mesh) {
+[[nodiscard]] std::vector<std::uint8_t> flat_corners(const Mesh& mesh, const CancelFlag& cancel) {
     std::vector<std::uint8_t> flat;
     if (mesh.normal_domain == NormalDomain::Corner) {
         for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+            poll(cancel, i);
             const Vec3 n = face_normal(mesh, mesh.triangles[i / 3]);
             flat.push_back(glm::dot(n, mesh.normals[i]) > kFlat ? 1 : 0);
         }
@@ -47,19 +59,34 @@ constexpr float kFlat = 0.9999f;  // cosine of a corner's normal to its face's
     return flat;
 }
 
-void renew_normals(Mesh& mesh, const std::vector<std::uint8_t>& flat) {
+void renew_normals(Mesh& mesh, const std::vector<std::uint8_t>& flat, const CancelFlag& cancel) {
     if (mesh.normal_domain == NormalDomain::Face) {
         return;
     }
-    const std::vector<Vec3> smooth = mean_normals(mesh);
+    const std::vector<Vec3> smooth = mean_normals(mesh, cancel);
     if (mesh.normal_domain == NormalDomain::Vertex) {
         mesh.normals = smooth;
         return;
     }
     for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+        poll(cancel, i);
         const UVec3& t = mesh.triangles[i / 3];
         mesh.normals[i] = flat[i] != 0 ? face_normal(mesh, t) : smooth[t[static_cast<int>(i % 3)]];
     }
+}
+
+// What a program says, of a vertex with normal n, as a move in the object's space.
+[[nodiscard]] Vec3 offset_in_object(const NodeOp& op,
+                                    const Vec3& value,
+                                    const Vec3& n,
+                                    const Instance& instance) {
+    const bool in_world = op.mode == kDisplaceInWorld;
+    Vec3 offset = value;
+    if (op.code == NodeOpCode::AovValue) {
+        // Normals go to the object's space by the transposed matrix.
+        offset *= in_world ? n : normalize_or(glm::transpose(Mat3(instance.to_world)) * n, n);
+    }
+    return in_world ? transform_vector(instance.to_object, offset) : offset;
 }
 
 // The vertices that one material moves, and where its program is asked about them.
@@ -87,6 +114,7 @@ class Displacer {
     Scene& scene_;
     const CancelFlag& cancel_;
     ShadingScratch scratch_;
+    std::vector<Vec3> values_;
 };
 
 bool Displacer::moves(const Instance& instance) const {
@@ -98,10 +126,11 @@ bool Displacer::moves(const Instance& instance) const {
 // Each vertex belongs to the first triangle that has it and moves.
 std::map<std::uint32_t, Vertices> Displacer::collect(std::uint32_t number, const Mesh& mesh) const {
     const Instance& instance = scene_.instances[number];
-    const std::vector<Vec3> normals = smooth_normals(mesh);
+    const std::vector<Vec3> normals = smooth_normals(mesh, cancel_);
     std::vector<bool> done(mesh.positions.size());
     std::map<std::uint32_t, Vertices> by_material;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        poll(cancel_, i);
         const std::size_t slot = mesh.material_indices.empty() ? 0 : mesh.material_indices[i];
         const std::uint32_t material =
             instance.materials[std::min(slot, instance.materials.size() - 1)];
@@ -136,40 +165,33 @@ void Displacer::move(const Vertices& vertices,
                      const Material& material,
                      const Instance& instance,
                      Mesh& mesh) {
-    const std::size_t count = vertices.hits.size();
-    std::vector<Vec3> values(count * material.aovs.closures.size());
-    evaluate_aovs(material, scene_.shading, vertices.hits, scratch_, values);
-    for (std::size_t k = 0; k < material.aovs.closures.size(); ++k) {
-        const NodeOp& op = material.aovs.closures[k];
-        const bool in_world = op.mode == kDisplaceInWorld;
-        for (std::size_t i = 0; i < count; ++i) {
-            Vec3 offset = values[k * count + i];
-            if (op.code == NodeOpCode::AovValue) {
-                const Vec3& n = vertices.hits[i].ns;
-                // Normals go to the object's space by the transposed matrix.
-                offset *=
-                    in_world ? n : normalize_or(glm::transpose(Mat3(instance.to_world)) * n, n);
-            }
-            if (in_world) {
-                offset = transform_vector(instance.to_object, offset);
-            }
-            if (is_finite(offset)) {
-                mesh.positions[vertices.index[i]] += offset;
+    const std::span<const SurfaceInteraction> all = vertices.hits;
+    for (std::size_t first = 0; first < all.size(); first += kBatch) {
+        throw_if_cancelled(cancel_);
+        const auto hits = all.subspan(first, std::min(kBatch, all.size() - first));
+        values_.assign(hits.size() * material.aovs.closures.size(), Vec3(0.0f));
+        evaluate_aovs(material, scene_.shading, hits, scratch_, values_);
+        for (std::size_t k = 0; k < material.aovs.closures.size(); ++k) {
+            const NodeOp& op = material.aovs.closures[k];
+            for (std::size_t i = 0; i < hits.size(); ++i) {
+                const Vec3 offset =
+                    offset_in_object(op, values_[k * hits.size() + i], hits[i].ns, instance);
+                if (is_finite(offset)) {
+                    mesh.positions[vertices.index[first + i]] += offset;
+                }
             }
         }
     }
 }
 
 void Displacer::displace(std::uint32_t number, Mesh& mesh) {
-    if (cancel_.cancelled()) {
-        throw Cancelled();
-    }
+    throw_if_cancelled(cancel_);
     const std::map<std::uint32_t, Vertices> by_material = collect(number, mesh);
-    const std::vector<std::uint8_t> flat = flat_corners(mesh);
+    const std::vector<std::uint8_t> flat = flat_corners(mesh, cancel_);
     for (const auto& [material, vertices] : by_material) {
         move(vertices, scene_.displacements[material], scene_.instances[number], mesh);
     }
-    renew_normals(mesh, flat);
+    renew_normals(mesh, flat, cancel_);
 }
 
 bool Displacer::run() {
@@ -196,12 +218,11 @@ bool Displacer::run() {
     for (std::size_t i = 0; i < target.size(); ++i) {
         scene_.instances[i].mesh = target[i] != kNone ? target[i] : scene_.instances[i].mesh;
     }
+    const std::vector<std::uint32_t> uses = count_mesh_uses(first_new, scene_.instances);
     for (const auto& [key, mesh] : displaced) {
         const std::uint32_t before = key.first;
         // With a version a later scene may ask for the mesh as it was.
-        if (scene_.description.meshes[before].version == 0 &&
-            std::ranges::none_of(scene_.instances,
-                                 [&](const Instance& i) { return i.mesh == before; })) {
+        if (scene_.description.meshes[before].version == 0 && uses[before] == 0) {
             scene_.description.meshes[before] = Mesh();
         }
     }

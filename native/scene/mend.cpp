@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kCancelPollInterval = 1u << 18;
 
 void poll(const CancelFlag& cancel, std::size_t i) {
-    if (i % kCancelPollInterval == 0 && cancel.cancelled()) {
-        throw Cancelled();
+    if (i % kCancelPollInterval == 0) {
+        throw_if_cancelled(cancel);
     }
 }
 

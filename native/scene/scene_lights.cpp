@@ -11,12 +11,6 @@ namespace {
 
 constexpr std::size_t kCancelPollInterval = 1u << 16;
 
-void throw_if_cancelled(const CancelFlag& cancel) {
-    if (cancel.cancelled()) {
-        throw Cancelled();
-    }
-}
-
 // The triangles of one instance that next-event estimation aims at.
 void collect_emitters(const Scene& scene,
                       std::uint32_t instance,
@@ -57,6 +51,9 @@ void collect_emitters(const Scene& scene,
 void prepare_lights(Scene& scene, const CancelFlag& cancel) {
     std::vector<EmissiveTriangle> emitters;
     for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
         collect_emitters(scene, i, cancel, emitters);
     }
     scene.needs.emissive_triangles = !emitters.empty();
@@ -76,6 +73,7 @@ void prepare_lights(Scene& scene, const CancelFlag& cancel) {
     input.meshes = scene.description.meshes;
     input.instances = scene.instances;
     input.environment = scene.environment.get();
+    input.cancel = &cancel;
     scene.lights = std::make_unique<LightSampler>(input);
     scene.needs.lamps_hittable = scene.lights->has_hittable_lamps();
     scene.needs.nee = !scene.lights->empty();

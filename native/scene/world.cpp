@@ -59,9 +59,7 @@ std::vector<Rgb> evaluate_map(const Scene& scene,
     ShadingContext context = scene.shading;
     context.paths = paths;
     pool.parallel_for(size.height, [&](std::size_t y, unsigned worker) {
-        if (cancel.cancelled()) {
-            throw Cancelled();
-        }
+        throw_if_cancelled(cancel);
         std::vector<Vec3> directions(size.width);
         for (std::uint32_t x = 0; x < size.width; ++x) {
             const Vec2 uv((static_cast<float>(x) + 0.5f) / static_cast<float>(size.width),

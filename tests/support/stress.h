@@ -12,6 +12,12 @@
 
 namespace pharos::testing {
 
+// Threads of sessions whose results do not depend on them: 2, or PHAROS_TEST_THREADS.
+[[nodiscard]] inline unsigned thread_count() {
+    const char* wanted = std::getenv("PHAROS_TEST_THREADS");
+    return wanted != nullptr ? static_cast<unsigned>(std::atoi(wanted)) : 2;
+}
+
 [[nodiscard]] inline std::uint64_t case_count(std::uint64_t usual, std::uint64_t long_form) {
     if (std::getenv("PHAROS_LONG_TESTS") != nullptr) {
         return long_form;

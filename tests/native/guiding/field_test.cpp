@@ -2,7 +2,6 @@
 // attacks, and its file is what it says.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "guiding/guiding_field.h"
 #include "support/chi_square.h"
 #include "support/random.h"
+#include "support/stress.h"
 
 namespace pharos {
 namespace {
@@ -296,11 +296,12 @@ TEST(Field, AttacksLeaveItFinite) {
         },
         [](RadianceRecord& r, std::size_t) { r.key = 5; },
     };
+    // The long form: more than 10 000 steps each.
+    const std::uint64_t passes = testing::case_count(6, 2600);
+    std::uint64_t given = 0;
     for (const GuidingConfig& config : {GuidingConfig::neural(), GuidingConfig::slides()}) {
         for (const Attack& attack : attacks) {
             GuidingField field(config, unit_box());
-            // PHAROS_LONG_TESTS=1: more than 10 000 steps each.
-            const std::uint64_t passes = std::getenv("PHAROS_LONG_TESTS") != nullptr ? 2600 : 6;
             for (std::uint64_t pass = 0; pass < passes; ++pass) {
                 auto records = record_pass(field, two_lights, 2048, pass + 1);
                 for (std::size_t i = 0; i < records.size(); ++i) {
@@ -308,6 +309,7 @@ TEST(Field, AttacksLeaveItFinite) {
                 }
                 const TrainStatistics statistics = field.train(records, pool);
                 ASSERT_TRUE(std::isfinite(statistics.loss));
+                given += records.size();
             }
             expect_valid(field);
             // And it still learns afterwards.
@@ -319,6 +321,10 @@ TEST(Field, AttacksLeaveItFinite) {
             expect_valid(field);
         }
     }
+    testing::say_stress("training on lies: weights and densities that are no numbers",
+                        given,
+                        HasFailure() ? 1.0 : 0.0,
+                        0.0);
 }
 
 TEST(Field, CancelledTrainingPublishesNothing) {

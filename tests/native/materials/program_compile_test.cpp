@@ -513,7 +513,7 @@ TEST(ProgramCompile, RandomProgramsNeverCrash) {
     Surfaces surfaces;
     std::uint64_t accepted = 0;
     std::uint64_t varying = 0;
-    const std::uint64_t tries = testing::case_count(100000, 3000000);
+    const std::uint64_t tries = testing::case_count(100000, 10000000);
     for (std::uint64_t i = 0; i < tries; ++i) {
         context.blender_version = i % 2 == 0 ? 304 : 405;
         SceneReport report;

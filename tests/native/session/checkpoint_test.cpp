@@ -46,7 +46,7 @@ Picture all_passes(const RenderSession& session) {
 
 SessionOptions with_file(const std::string& path, Resume resume = Resume::Must) {
     SessionOptions options;
-    options.threads = 2;
+    options.threads = thread_count();
     options.checkpoint = {path, 1e9, resume};
     return options;
 }
@@ -76,7 +76,7 @@ struct Reference {
 };
 
 Reference uninterrupted(const SceneDescription& d) {
-    RenderSession session(d, 2);
+    RenderSession session(d, thread_count());
     wait(session);
     return {all_passes(session), session.progress()};
 }

@@ -1,5 +1,4 @@
 // Scenes of sizes nobody builds on purpose: few of each usually, all of them in tests/stress.
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -15,6 +14,7 @@
 #include "support/scratch.h"
 #include "support/stress.h"
 #include "support/test_scenes.h"
+#include "support/timing.h"
 
 namespace pharos {
 namespace {
@@ -35,10 +35,9 @@ void add_floor_and_camera(SceneBuilder& builder,
 
 // Renders, and says how long all of it took.
 void expect_picture(const char* what, std::uint64_t count, SceneDescription d) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch since_start;
     const Rendered result = render(std::move(d), 2);
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double seconds = since_start.seconds();
     ASSERT_EQ(result.progress.state, SessionState::Finished) << result.progress.error;
     EXPECT_EQ(result.progress.nonfinite_samples, 0u);
     EXPECT_TRUE(std::isfinite(result.mean(0)));
@@ -172,38 +171,6 @@ TEST(Scripts, TakeADumpFromHere) {
     }
     write_dump(d, path);
     EXPECT_EQ(read_dump(path).instances.size(), d.instances.size());
-}
-
-// At any moment of building, passes and training: the end comes soon, and the next render is right.
-TEST(Cancel, AtRandomMoments) {
-    const std::uint64_t count = case_count(20, 200);
-    Random random(6);
-    std::vector<double> seconds;
-    SceneDescription d = two_rooms(512, 384, 1u << 20);
-    d.settings.guiding = GuidingMode::Neural;
-    for (int i = 0; i < 40; ++i) {
-        d.meshes.push_back(sphere_mesh("ball", random.uniform3(), 0.1f, 96));
-        d.instances.push_back(d.instances.front());
-        d.instances.back().mesh = static_cast<std::uint32_t>(d.meshes.size() - 1);
-    }
-    for (std::uint64_t i = 0; i < count; ++i) {
-        RenderSession session(d, 2);
-        const std::uint32_t moment = random.index(i % 2 == 0 ? 60 : 900);
-        static_cast<void>(session.wait(std::chrono::milliseconds(moment)));
-        const auto begin = std::chrono::steady_clock::now();
-        session.cancel();
-        ASSERT_TRUE(session.wait(std::chrono::milliseconds(60000)));
-        seconds.push_back(
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-        ASSERT_EQ(session.progress().state, SessionState::Cancelled);
-    }
-    std::ranges::sort(seconds);
-    const double p95 = seconds[seconds.size() * 95 / 100];
-    say_stress("cancel at random moments: p95 seconds", count, p95, 0.25);
-    say_stress("cancel at random moments: worst seconds", count, seconds.back(), 1.0);
-    EXPECT_LE(seconds.back(), 10.0) << "on any machine";
-    SceneDescription next = two_rooms(32, 24, 4);
-    EXPECT_EQ(render(next, 2).combined, render(next, 1).combined);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "support/stress.h"
 #include "support/test_scenes.h"
 #include "support/timing.h"
 
@@ -47,7 +48,7 @@ LivePicture finished(LiveSession& session) {
 }
 
 LivePicture fresh(SceneDescription description) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(std::move(description));
     return finished(session);
 }
@@ -88,7 +89,7 @@ std::vector<Edit> edits() {
 }
 
 TEST(LiveSession, EveryEditShowsWhatAFreshStartShows) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(versioned_rooms(3));
     const LivePicture before = finished(session);
     EXPECT_EQ(before.width, kWidth);
@@ -131,7 +132,7 @@ SceneDescription textured_scene(float value, std::uint64_t version) {
 }
 
 TEST(LiveSession, ImagesAndTheWorldsMapAreKept) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(textured_scene(0.1f, 10));
     const LivePicture first = finished(session);
     EXPECT_EQ(first.pixels, fresh(textured_scene(0.1f, 0)).pixels);
@@ -162,7 +163,7 @@ TEST(LiveSession, ImagesAndTheWorldsMapAreKept) {
 }
 
 TEST(LiveSession, AViewNeedsNoScene) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(versioned_rooms(2));
     const LivePicture first = finished(session);
     SceneDescription moved = versioned_rooms(2);
@@ -195,7 +196,7 @@ TEST(LiveSession, APictureCanBeWaitedFor) {
 }
 
 TEST(LiveSession, NothingStartsAgainWhereNothingChanged) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(versioned_rooms(2));
     static_cast<void>(finished(session));
     const std::uint64_t pictures = session.progress().pictures;
@@ -206,7 +207,7 @@ TEST(LiveSession, NothingStartsAgainWhereNothingChanged) {
 }
 
 TEST(LiveSession, TheGuideLivesOnUntilItIsForgotten) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     SceneDescription description = versioned_rooms(8);
     description.settings.guiding = GuidingMode::Neural;
     session.set_scene(description);
@@ -231,7 +232,7 @@ TEST(LiveSession, TheGuideLivesOnUntilItIsForgotten) {
 }
 
 TEST(LiveSession, LobesAreToldWhileItRendersAndAfterwards) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     SceneDescription description = versioned_rooms(6);
     description.settings.guiding = GuidingMode::Neural;
     session.set_scene(std::move(description));
@@ -257,7 +258,7 @@ TEST(LiveSession, LobesAreToldWhileItRendersAndAfterwards) {
 
 TEST(LiveSession, ChangesInARushShowTheLast) {
     const LivePicture expected = fresh(versioned_rooms(2));
-    LiveSession session(2);
+    LiveSession session(thread_count());
     for (int i = 0; i < 40; ++i) {
         SceneDescription description = versioned_rooms(2);
         description.instances[2].to_world[3].x += 0.01f * static_cast<float>(39 - i);
@@ -272,7 +273,7 @@ TEST(LiveSession, ChangesInARushShowTheLast) {
 }
 
 TEST(LiveSession, MissingContentIsAnErrorThatPasses) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(without_content(versioned_rooms(2), 70));
     ASSERT_TRUE(session.wait(kPatience));
     EXPECT_EQ(session.progress().render.state, SessionState::Failed);
@@ -287,7 +288,7 @@ TEST(LiveSession, ALargeViewShowsACoarsePictureFirst) {
     FilmDescription& film = description.film;
     film.width = film.crop_width = 640;
     film.height = film.crop_height = 480;
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_scene(description);
     LivePicture first;
     while (first.pixels.empty() && !session.wait(std::chrono::milliseconds(1))) {
@@ -299,7 +300,7 @@ TEST(LiveSession, ALargeViewShowsACoarsePictureFirst) {
 }
 
 TEST(LiveSession, PausedItRendersNothing) {
-    LiveSession session(2);
+    LiveSession session(thread_count());
     session.set_paused(true);
     session.set_scene(versioned_rooms(1));
     ASSERT_TRUE(session.wait(kPatience));
@@ -310,7 +311,7 @@ TEST(LiveSession, PausedItRendersNothing) {
 
 TEST(LiveSession, ItMayEndAtAnyMoment) {
     for (int i = 0; i < 20; ++i) {
-        LiveSession session(2);
+        LiveSession session(thread_count());
         session.set_scene(versioned_rooms(1u << 20));
         session.wait(std::chrono::milliseconds(i));
     }

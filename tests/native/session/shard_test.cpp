@@ -1,11 +1,14 @@
 #include "film/shard.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "session/render_session.h"
+#include "support/random.h"
 #include "support/scratch.h"
+#include "support/stress.h"
 #include "support/test_scenes.h"
 
 namespace pharos {
@@ -108,6 +111,40 @@ TEST(Shards, FrozenFieldMergesToTheSingleRun) {
     EXPECT_LE(largest_difference(merge({a, b}), merge({whole})), kTolerance);
     const std::string off = render_to(folder.file("off.exr"), scene(9), from(0));
     EXPECT_GT(largest_difference(merge({off}), merge({whole})), 1e-3) << "it guided nothing";
+}
+
+// Cut anywhere, merged in any order: guided by a frozen field every other time.
+TEST(Shards, AnyPartitionMergesToTheSingleRun) {
+    constexpr std::uint32_t kSamples = 12;
+    const GuidingMode modes[] = {GuidingMode::Off, GuidingMode::Neural};
+    RenderSession training(scene(24, GuidingMode::Neural), SessionOptions{});
+    while (!training.wait(std::chrono::milliseconds(1000))) {
+    }
+    const std::uint64_t partitions = case_count(2, 30);
+    double worst = 0.0;
+    test::Random random(8);
+    for (std::uint64_t i = 0; i < partitions; ++i) {
+        const ScratchFolder folder;
+        const GuidingMode mode = modes[i % 2];
+        const auto field = mode == GuidingMode::Off ? std::vector<std::byte>() : training.field();
+        const auto part = [&](std::uint32_t first, std::uint32_t count) {
+            return render_to(
+                folder.file(std::to_string(first) + "+" + std::to_string(count) + ".exr"),
+                scene(count, mode),
+                from(first, field));
+        };
+        std::vector<std::string> paths;
+        for (std::uint32_t first = 0; first < kSamples;) {
+            const std::uint32_t count = 1 + random.index(kSamples - first);
+            paths.insert(paths.begin() + random.index(static_cast<std::uint32_t>(paths.size()) + 1),
+                         part(first, count));
+            first += count;
+        }
+        const double difference = largest_difference(merge(paths), merge({part(0, kSamples)}));
+        EXPECT_LE(difference, kTolerance) << paths.size() << " parts";
+        worst = std::max(worst, difference);
+    }
+    say_stress("partitions of a frame's samples: difference when merged", partitions, worst, 1e-6);
 }
 
 TEST(Shards, AMergedPictureMergesOn) {
