@@ -52,6 +52,9 @@ inline constexpr float kUnitRoundoff = 0x1p-24f;
 inline constexpr float kPointErrorUnits = 4.0f;  // of point, traced vertices and ray origin
 inline constexpr float kPlaneErrorUnits = 4.0f;  // of the traversal's normal and plane distance
 inline constexpr float kMaxTilt = 64.0f;         // of needles, whose normal is hardly known
+// Of the triangle's extent, at least: in a plane of a coordinate that is 0 all else vanishes, and a
+// step of denormal length is none to the traversal, where the triangle is small.
+inline constexpr float kLeastErrorUnits = 0x1p-6f;
 inline constexpr float kInset = 8.0f;  // error bounds between a point and its triangle's edges
 
 // Bound of the distance between the point and the plane that was traced, along unit normal ng.
@@ -68,7 +71,8 @@ inline constexpr float kInset = 8.0f;  // error bounds between a point and its t
     const Simd3 extent = max(a, b);
     const float tilt = std::min(dot(cross_of_sums(a, b), extent) * inverse_length,
                                 kMaxTilt * max_component(extent));
-    return kUnitRoundoff * (kPointErrorUnits * point + kPlaneErrorUnits * tilt);
+    return kUnitRoundoff * (kPointErrorUnits * point + kPlaneErrorUnits * tilt +
+                            kLeastErrorUnits * max_component(extent));
 }
 
 // Barycentrics moved off the triangle's edges by a multiple of the error bound. A point on an edge

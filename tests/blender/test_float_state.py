@@ -155,6 +155,7 @@ def _sessions(module, watch: Watch) -> None:
     live = module.LiveSession(2)
     live.set_scene(description.copy())
     live.wait(0.2)
+    live.wait_picture(0.1)
     live.set_view(description)
     live.ask_lobes(0.5, 0.5)
     for name in ("lobes", "picture", "progress", "statistics", "report", "forget_guide"):

@@ -90,6 +90,38 @@ TEST_P(Scale, RespawnedRaysNeverHitTheirOwnTriangle) {
                0.0);
 }
 
+// Small faces in a plane through the origin: all their coordinates along the normal are 0, and so
+// is what floats know of their error. They were black.
+TEST(Watertight, FacesInCoordinatePlanesAreLeft) {
+    Random random(11);
+    for (int axis = 0; axis < 3; ++axis) {
+        for (float size = 1e-6f; size < 1e7f; size *= 10.0f) {
+            Vec3 n(0.0f);
+            Vec3 along(0.0f);
+            n[axis] = 1.0f;
+            along[(axis + 1) % 3] = size;
+            const Vec3 across = glm::cross(n, along);
+            TestGeometry scene;
+            Mesh square;
+            square.name = "square";
+            square.positions = {-along - across, along - across, along + across, across - along};
+            square.triangles = {UVec3(0, 1, 2), UVec3(0, 2, 3)};
+            scene.meshes.push_back(square);
+            scene.instances.push_back(make_instance(0, Mat4(1.0f)));
+            scene.build();
+            std::vector<Ray> rays;
+            for (int i = 0; i < 1000; ++i) {
+                const Vec3 origin = random.in_box(0.5f * size) + n * size;
+                rays.push_back({origin, glm::normalize(random.in_box(0.5f * size) - n * size)});
+            }
+            const Generation left = advance(scene, random, rays, {});
+            ASSERT_GT(left.rays.size(), 100u);
+            EXPECT_EQ(advance(scene, random, left.rays, left.from).self_hits, 0u)
+                << "axis " << axis << ", size " << size;
+        }
+    }
+}
+
 // Of less than a tenth of a millimetre the distance along the ray has few digits.
 class PointScale : public Scale {};
 

@@ -8,6 +8,7 @@
 
 #include "core/memory.h"
 #include "scene/dump.h"
+#include "scene/scene.h"
 #include "session/memory_estimate.h"
 #include "support/random.h"
 #include "support/render.h"
@@ -109,6 +110,32 @@ TEST(LargeScenes, ManyImages) {
         builder.instance(mesh, {material}, m);
     }
     expect_picture("images", count, builder.build());
+}
+
+// Mesh and structure of smooth triangles with texture coordinates, single and shared.
+TEST(LargeScenes, BytesOfATriangle) {
+    const auto rings = static_cast<std::uint32_t>(case_count(708, 708));
+    for (const std::uint32_t users : {1u, 2u}) {
+        SceneBuilder builder;
+        add_floor_and_camera(builder);
+        Mesh ball = sphere_mesh("ball", Vec3(0, 0, 2), 1.0f, rings, rings);
+        ball.uv_maps.push_back({"UVMap", std::vector<Vec2>(3 * ball.triangles.size(), Vec2(0.5f))});
+        const std::uint64_t triangles = ball.triangles.size();
+        const auto grey = builder.material("grey", diffuse_program(Rgb(0.5f)));
+        const std::uint32_t mesh = builder.mesh(std::move(ball));
+        for (std::uint32_t user = 0; user < users; ++user) {
+            builder.instance(mesh, {grey});
+        }
+        SceneReport report;
+        const auto scene = build_scene(builder.build(), CancelFlag(), report);
+        const double bytes = static_cast<double>(scene->bytes()) / static_cast<double>(triangles);
+        say_stress(users == 1 ? "bytes of a triangle: mesh and structure"
+                              : "bytes of a triangle of a shared mesh: mesh and structure",
+                   triangles,
+                   bytes,
+                   150.0);
+        EXPECT_LE(bytes, 150.0);
+    }
 }
 
 TEST(LargeScenes, SixteenThousandPixelsWide) {
