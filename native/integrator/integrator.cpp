@@ -47,8 +47,7 @@ Integrator::Integrator(const Scene& scene, ThreadPool& pool)
     : scene_(scene),
       pool_(pool),
       passes_(scene.description.passes.wanted, scene.description.passes.aovs),
-      camera_(
-          scene.description.camera, scene.description.film.width, scene.description.film.height),
+      camera_(scene.camera(), scene.description.film.width, scene.description.film.height),
       filter_(scene.description.film.filter, scene.description.film.filter_width) {
     for (unsigned worker = 0; worker < pool.size(); ++worker) {
         workers_.push_back(std::make_unique<Worker>());

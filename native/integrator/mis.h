@@ -71,7 +71,7 @@ inline void add_lamp_hit(const RenderContext& context,
         const LampPoint point =
             scene.lights->lamp_point(hit.lamp, ray.origin, ray.direction, hit.distance);
         const SurfaceInteraction at =
-            lamp_interaction(point, ray.direction, hit.distance, hit.program);
+            lamp_interaction(scene, point, ray.direction, hit.distance, hit.program);
         const ShadingContext shading =
             shading_with_paths(scene, 1, batch.path_infos, [&](std::size_t) {
                 PathInfo info = path_info(batch.counters[path]);

@@ -59,14 +59,16 @@ namespace pharos {
     return info;
 }
 
-// What a lamp's nodes are asked about; its material is the lamp's program.
-[[nodiscard]] inline SurfaceInteraction lamp_interaction(const LampPoint& point,
+// What a lamp's nodes are asked about, its position the world's; its material is the lamp's
+// program.
+[[nodiscard]] inline SurfaceInteraction lamp_interaction(const Scene& scene,
+                                                         const LampPoint& point,
                                                          const Vec3& wi,
                                                          float distance,
                                                          std::uint32_t program) {
     constexpr float kFar = 1e18f;  // its square is still a number
     SurfaceInteraction hit;
-    hit.p = point.p;
+    hit.p = distance < kFar ? point.p + scene.shading.origin : point.p;
     hit.ng = hit.ns = point.n;
     hit.wo = -wi;
     hit.t = std::min(distance, kFar);

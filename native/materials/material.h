@@ -85,7 +85,8 @@ struct ShadingContext {
     std::span<const Instance> instances;
     std::span<const Texture> textures;  // index = SceneDescription::images
     std::uint32_t blender_version = 304;
-    Mat4 world_to_camera{1.0f};            // looks along -z
+    Vec3 origin{0.0f};                     // of the hits' positions, in the world
+    Mat4 world_to_camera{1.0f};            // of those positions; looks along -z
     Mat4 camera_to_window{1.0f};           // projective: the frame is [0, 1] x [0, 1]
     std::span<const PathInfo> paths;       // of the hits or directions; empty: camera rays
     std::span<const Bounds3> mesh_bounds;  // object space, by mesh; empty: found when first needed

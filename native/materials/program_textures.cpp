@@ -261,7 +261,8 @@ void run_environment_image(const Evaluation& e, const NodeOp& op) {
     const ImageProjection projection =
         ball ? ImageProjection::MirrorBall : ImageProjection::Equirectangular;
     lookup_projected(e, op, fill_coordinates(e, [&](std::size_t i) {
-                         return project(projection, vector_or(direction, i, e.hit(i).p));
+                         return project(projection,
+                                        vector_or(direction, i, world_point(e, e.hit(i))));
                      }));
 }
 

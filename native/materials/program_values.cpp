@@ -87,6 +87,10 @@ constexpr Vec3 kUp(0.0f, 0.0f, 1.0f);
 
 }  // namespace
 
+Vec3 world_point(const Evaluation& e, const SurfaceInteraction& hit) {
+    return e.instance(hit) != nullptr ? hit.p + e.context.origin : hit.p;
+}
+
 Vec3 object_normal(const Evaluation& e, const SurfaceInteraction& hit) {
     const Instance* instance = e.instance(hit);
     return instance != nullptr ? normalize_or(transform_normal(instance->to_world, hit.ns), hit.ns)
@@ -172,7 +176,7 @@ void run_geometry(const Evaluation& e, const NodeOp& op) {
         const SurfaceInteraction& hit = e.hit(i);
         switch (output) {
             case GeometryOutput::Position:
-                e.store(op, i, hit.p);
+                e.store(op, i, world_point(e, hit));
                 break;
             case GeometryOutput::Normal:
                 e.store(op, i, hit.ns);
@@ -372,7 +376,10 @@ void run_object_info(const Evaluation& e, const NodeOp& op) {
         const SurfaceInteraction& hit = e.hit(i);
         const Instance* instance = e.instance(hit);
         if (static_cast<ObjectInfoOutput>(op.mode) == ObjectInfoOutput::Location) {
-            e.store(op, i, instance != nullptr ? Vec3(instance->to_world[3]) : Vec3(0.0f));
+            e.store(
+                op,
+                i,
+                instance != nullptr ? Vec3(instance->to_world[3]) + e.context.origin : Vec3(0.0f));
         } else {
             // A number of its own for each instance (integer hash of Wang, 32 bits).
             std::uint32_t h = hit.instance;
@@ -460,18 +467,24 @@ void run_vector_transform(const Evaluation& e, const NodeOp& op) {
     flip[2][2] = -1.0f;
     const Mat4 to_camera = flip * e.context.world_to_camera;
     const Mat4 from_camera = glm::inverse(to_camera);
+    // Points of the world are the user's; all matrices lead to and from the hits' coordinates.
+    const Vec3 origin = type == kPointType ? e.context.origin : Vec3(0.0f);
     for (std::size_t i = 0; i < e.lanes; ++i) {
         const Instance* instance = e.instance(e.hit(i));
         Vec3 v = vector.vector(i);
-        if (from == kObjectSpace && instance != nullptr) {
-            v = transform_as(type, instance->to_world, instance->to_object, v);
-        } else if (from > kObjectSpace) {
+        if (from > kObjectSpace) {
             v = transform_as(type, from_camera, to_camera, v);
+        } else if (from == kObjectSpace && instance != nullptr) {
+            v = transform_as(type, instance->to_world, instance->to_object, v);
+        } else {
+            v -= origin;
         }
-        if (to == kObjectSpace && instance != nullptr) {
-            v = transform_as(type, instance->to_object, instance->to_world, v);
-        } else if (to > kObjectSpace) {
+        if (to > kObjectSpace) {
             v = transform_as(type, to_camera, from_camera, v);
+        } else if (to == kObjectSpace && instance != nullptr) {
+            v = transform_as(type, instance->to_object, instance->to_world, v);
+        } else {
+            v += origin;
         }
         const bool is_normal = type != kVectorType && type != kPointType;
         e.store(op, i, is_normal ? normalize_or(v, Vec3(0.0f)) : v);

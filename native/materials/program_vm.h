@@ -163,6 +163,8 @@ void run_transparency(const Evaluation& e, std::span<const NodeOp> ops, std::spa
 void shift_hits(const Evaluation& e, const Vec2& step);
 
 // Geometry shared by operations.
+// A surface's position as the user sees it; a direction of the world stays one.
+[[nodiscard]] Vec3 world_point(const Evaluation& e, const SurfaceInteraction& hit);
 [[nodiscard]] Vec3 object_normal(const Evaluation& e, const SurfaceInteraction& hit);
 [[nodiscard]] Vec3 generated_coordinate(const Evaluation& e, const SurfaceInteraction& hit);
 [[nodiscard]] Vec3 default_tangent(const Evaluation& e, const SurfaceInteraction& hit);

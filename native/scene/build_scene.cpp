@@ -8,6 +8,7 @@
 #include "image/image_io.h"
 #include "scene/displace.h"
 #include "scene/mend.h"
+#include "scene/origin.h"
 #include "scene/scene.h"
 #include "scene/scene_build.h"
 #include "scene/scene_lights.h"
@@ -145,9 +146,12 @@ void SceneBuild::mend() {
         }
     }
     poll();
-    scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances, pieces_ != nullptr);
     mend_lamps(d.lights, report_);
     mend_camera(d, report_);
+    if (const Vec3 origin = find_origin(*scene_); origin != Vec3(0.0f)) {
+        move_to_origin(*scene_, origin);
+    }
+    scene_->surfaces = make_instance_surfaces(d.meshes, scene_->instances, pieces_ != nullptr);
 }
 
 // Only images that some program reads take time and memory.

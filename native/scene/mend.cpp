@@ -161,22 +161,6 @@ void drop_misfits(Mesh& mesh, SceneReport& report) {
     });
 }
 
-// The inverse, unless the matrix flattens space (relative to its columns' lengths: a tiny object is
-// not flat).
-std::optional<Mat4> invert(const Mat4& to_world) {
-    if (!is_finite(to_world)) {
-        return std::nullopt;
-    }
-    const glm::dmat4 m(to_world);
-    const glm::dmat3 linear(m);
-    const double volume = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
-    if (!(std::abs(glm::determinant(linear)) > 1e-6 * volume)) {
-        return std::nullopt;
-    }
-    const Mat4 inverse(glm::inverse(m));
-    return is_finite(inverse) ? std::optional(inverse) : std::nullopt;
-}
-
 bool is_finite(const LightDescription& lamp) {
     const std::array values = {lamp.radius,
                                lamp.spot_angle,
@@ -240,6 +224,20 @@ void mend_mesh(Mesh& mesh, const CancelFlag& cancel, SceneReport& report) {
     if (dropping) {
         keep_triangles(mesh, kept);
     }
+}
+
+std::optional<Mat4> invert(const Mat4& to_world) {
+    if (!is_finite(to_world)) {
+        return std::nullopt;
+    }
+    const glm::dmat4 m(to_world);
+    const glm::dmat3 linear(m);
+    const double volume = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
+    if (!(std::abs(glm::determinant(linear)) > 1e-6 * volume)) {
+        return std::nullopt;
+    }
+    const Mat4 inverse(glm::inverse(m));
+    return is_finite(inverse) ? std::optional(inverse) : std::nullopt;
 }
 
 std::optional<Instance> mend_instance(const SceneDescription& description,

@@ -21,6 +21,10 @@ void mend_mesh(Mesh& mesh, const CancelFlag& cancel, SceneReport& report);
 
 inline constexpr float kMaxCoordinate = 1e15f;  // metres; squares of lengths stay finite
 
+// The inverse, unless the matrix flattens space (relative to its columns' lengths: a tiny object is
+// not flat) or is no number.
+[[nodiscard]] std::optional<Mat4> invert(const Mat4& to_world);
+
 // Nothing for an instance that cannot be shown: no mesh, or a matrix without an inverse. Slots
 // without a material get `default_material`.
 [[nodiscard]] std::optional<Instance> mend_instance(const SceneDescription& description,

@@ -1,5 +1,7 @@
 #include "scene/scene.h"
 
+#include "scene/origin.h"
+
 namespace pharos {
 
 namespace {
@@ -19,6 +21,12 @@ std::uint64_t bytes_of(const Mesh& mesh) {
 }
 
 }  // namespace
+
+CameraDescription Scene::camera() const {
+    CameraDescription camera = description.camera;
+    camera.to_world = moved_by(camera.to_world, -shading.origin);
+    return camera;
+}
 
 std::uint64_t Scene::bytes() const {
     std::uint64_t bytes =

@@ -33,6 +33,8 @@ struct SceneNeeds {
     bool nee = false;            // there is something to sample
 };
 
+// Positions are the world's minus shading.origin (origin.h); those of the description's camera and
+// instances are the world's.
 struct Scene {
     SceneDescription description;     // mended; programs, pixels and bytes of images are moved out
     std::vector<Instance> instances;  // those that can be shown, in the description's order
@@ -51,6 +53,9 @@ struct Scene {
     Bounds3 bounds;  // of everything there is to hit; the unit cube for nothing
     SceneNeeds needs;
     ShadingContext shading;  // spans into this scene
+
+    // The description's camera in the scene's own coordinates.
+    [[nodiscard]] CameraDescription camera() const;
 
     // Hit to interaction: position with its error bound, normals on wo's side, material.
     [[nodiscard]] SurfaceInteraction interaction(const Ray& ray, const Hit& hit) const {

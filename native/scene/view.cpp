@@ -12,7 +12,7 @@ void prepare_view(Scene& scene) {
         return;
     }
     ShadingContext& context = scene.shading;
-    context.world_to_camera = Camera(d.camera, d.film.width, d.film.height).world_to_camera();
+    context.world_to_camera = Camera(scene.camera(), d.film.width, d.film.height).world_to_camera();
     context.perspective = d.camera.type == CameraType::Perspective;
     context.pixel =
         (d.camera.window_upper - d.camera.window_lower) /

@@ -51,7 +51,7 @@ void train(const Scene& scene, Integrator& integrator, ThreadPool& pool, Guiding
 
 [[nodiscard]] SurfaceInteraction first_hit(const Scene& scene, const ProbeSettings& settings) {
     const SceneDescription& d = scene.description;
-    const Camera camera(d.camera, d.film.width, d.film.height);
+    const Camera camera(scene.camera(), d.film.width, d.film.height);
     const Vec2 pixel(static_cast<float>(settings.x) + 0.5f, static_cast<float>(settings.y) + 0.5f);
     const Ray ray = camera.generate_ray(pixel, Vec2(0.5f));
     const std::uint32_t visibility = kVisibleCamera;
@@ -201,7 +201,7 @@ FieldProbe probe_field(SceneDescription description,
         train(*scene, integrator, pool, field);
     }
     FieldProbe probe;
-    probe.position = surface.p;
+    probe.position = surface.p + scene->shading.origin;
     probe.normal = surface.ns;
     probe.mixture = ask(field, surface);
     probe.width = 2 * settings.height;

@@ -39,7 +39,7 @@ LobeProbe probe_lobes(const Scene& scene, const GuideController& guide, const Ve
     }
     const Vec2 corner(static_cast<float>(d.film.crop_x), static_cast<float>(d.film.crop_y));
     const Vec2 size(static_cast<float>(d.film.crop_width), static_cast<float>(d.film.crop_height));
-    const Camera camera(d.camera, d.film.width, d.film.height);
+    const Camera camera(scene.camera(), d.film.width, d.film.height);
     const Ray ray = camera.generate_ray(corner + place * size, Vec2(0.5f));
     const Hit hit = first_hit(scene, ray);
     if (hit.instance == kNone) {
@@ -47,7 +47,7 @@ LobeProbe probe_lobes(const Scene& scene, const GuideController& guide, const Ve
     }
     const SurfaceInteraction surface = scene.interaction(ray, hit);
     probe.hit = true;
-    probe.position = surface.p;
+    probe.position = surface.p + scene.shading.origin;
     probe.normal = surface.ns;
     if (guide.learned() == nullptr) {
         return probe;

@@ -119,7 +119,7 @@ void sample_light(const RenderContext& context,
         const LampPoint point =
             scene.lights->lamp_point(light->lamp, surface.p, sample.wi, sample.distance);
         batch.pending_lamps.push_back(
-            {lamp_interaction(point, sample.wi, sample.distance, light->program),
+            {lamp_interaction(scene, point, sample.wi, sample.distance, light->program),
              sample.wi,
              shadow});
     }

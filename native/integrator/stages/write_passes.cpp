@@ -67,7 +67,7 @@ void write_single_surface(const RenderContext& context,
                           std::uint32_t path,
                           PathBatch& batch) {
     const Scene& scene = context.scene;
-    add(context, FilmPass::Position, path, surface.p, batch);
+    add(context, FilmPass::Position, path, surface.p + scene.shading.origin, batch);
     if (!scene.pass_index.empty()) {
         set(context, FilmPass::ObjectIndex, path, scene.pass_index[surface.instance], batch);
     }

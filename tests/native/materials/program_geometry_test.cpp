@@ -291,5 +291,41 @@ TEST(ProgramGeometry, VectorTransformBetweenSpaces) {
     expect_near(stage.show(hit, NodeOpCode::ObjectInfo, ObjectInfoOutput::Location), Vec3(5, 6, 7));
 }
 
+// A scene whose coordinates begin elsewhere shows the same values.
+TEST(ProgramGeometry, OriginIsNotSeen) {
+    const Vec3 origin(4, -8, 16);
+    Stage plain;
+    plain.context.world_to_camera =
+        glm::rotate(Mat4(1.0f), 0.5f, Vec3(0, 1, 0)) * glm::translate(Mat4(1.0f), Vec3(1, 2, 3));
+    Stage moved;
+    moved.context.origin = origin;
+    moved.instances[0].to_world = glm::translate(Mat4(1.0f), -origin) * plain.instances[0].to_world;
+    moved.instances[0].to_object = glm::inverse(moved.instances[0].to_world);
+    moved.context.world_to_camera =
+        plain.context.world_to_camera * glm::translate(Mat4(1.0f), origin);
+    const SurfaceInteraction hit = plain.hit(1, 0.2f, 0.3f, true);
+    const SurfaceInteraction same = moved.hit(1, 0.2f, 0.3f, true);
+    const auto both = [&](NodeOpCode code, int mode, const std::vector<float>& vector = {}) {
+        const auto wanted = static_cast<std::uint16_t>(mode);
+        const auto operands = vector.empty() ? std::vector<std::vector<float>>{}
+                                             : std::vector<std::vector<float>>{vector};
+        SCOPED_TRACE(mode);
+        expect_near(moved.show(same, code, wanted, operands),
+                    plain.show(hit, code, wanted, operands),
+                    2e-5f);
+    };
+    both(NodeOpCode::Geometry, static_cast<int>(GeometryOutput::Position));
+    both(NodeOpCode::ObjectInfo, static_cast<int>(ObjectInfoOutput::Location));
+    for (const CoordinateOutput output : {CoordinateOutput::Generated,
+                                          CoordinateOutput::Object,
+                                          CoordinateOutput::Camera,
+                                          CoordinateOutput::Window}) {
+        both(NodeOpCode::Coordinate, static_cast<int>(output));
+    }
+    for (int mode = 0; mode < 27; ++mode) {
+        both(NodeOpCode::VectorTransform, mode, {0.3f, -0.4f, 0.9f});
+    }
+}
+
 }  // namespace
 }  // namespace pharos

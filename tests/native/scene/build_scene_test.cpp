@@ -439,5 +439,39 @@ TEST(BuildScene, DisplacementMovesVertices) {
     EXPECT_NEAR(height_under(built, 0.3f), 0.0f, 1e-5f);
 }
 
+// All of it far away: near zero within. Some of it: nothing moves.
+TEST(BuildScene, FarScenesBeginNearZero) {
+    const auto far_scene = [](float x, std::size_t near) {
+        SceneBuilder b;
+        for (std::size_t i = 0; i < 20; ++i) {
+            Mat4 place(1.0f);
+            place[3] = Vec4(i < near ? 0.0f : x + static_cast<float>(i), 0.0f, 0.0f, 1.0f);
+            b.object(floor_quad(), kNone, place);
+        }
+        SceneDescription d = b.build();
+        LightDescription lamp;
+        lamp.to_world[3] = Vec4(x, 0.0f, 3.0f, 1.0f);
+        d.lights.push_back(lamp);
+        d.has_camera = true;
+        d.camera.to_world[3] = Vec4(x, 0.0f, 3.0f, 1.0f);
+        return build(std::move(d));
+    };
+    for (const float x : {-20000.0f, 300.0f, 4096.0f, 1e7f}) {
+        const Built built = far_scene(x, 2);
+        const float origin = built.scene->shading.origin.x;
+        EXPECT_NEAR(origin, x, 64.0f) << x;
+        EXPECT_EQ(std::fmod(origin, 64.0f), 0.0f) << x;
+        EXPECT_EQ(built.scene->shading.origin.y, 0.0f);
+        const float here = built.scene->instances[10].to_world[3].x;
+        EXPECT_EQ(here + origin, x + 10.0f) << x;
+        EXPECT_EQ(built.scene->instances[10].to_object[3].x, -here) << x;
+        EXPECT_EQ(built.scene->description.lights[0].to_world[3].x, x - origin) << x;
+        EXPECT_EQ(built.scene->camera().to_world[3].x, x - origin) << x;
+        EXPECT_EQ(built.trace({Vec3(here + 0.3f, 0.2f, 5.0f), Vec3(0, 0, -1)}).instance, 10u) << x;
+    }
+    EXPECT_EQ(far_scene(200.0f, 0).scene->shading.origin, Vec3(0.0f));
+    EXPECT_EQ(far_scene(20000.0f, 4).scene->shading.origin, Vec3(0.0f));
+}
+
 }  // namespace
 }  // namespace pharos::testing

@@ -160,9 +160,7 @@ TEST(Scaling, PlacesChangeLittle) {
         const Difference d = difference(other, reference);
         const std::string far = std::to_string(std::lround(std::log10(metres)));
         say_stress(("room moved by 10^" + far + " m: relMSE").c_str(), 1, d.relmse, bar);
-        // The bar is what is printed; it is missed by seven to nine times, which must not grow.
-        EXPECT_TRUE(std::isfinite(d.relmse));
-        EXPECT_LE(d.relmse, 10.0 * bar) << metres;
+        EXPECT_LE(d.relmse, bar) << metres;
     }
 }
 
