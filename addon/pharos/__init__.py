@@ -13,6 +13,7 @@ from . import (  # noqa: E402
     checkpoints,
     compare,
     engine,
+    guide_memory,
     handlers,
     lobes,
     operators,
@@ -32,6 +33,7 @@ _PARTS = (
     compare,
     handlers,
     checkpoints,
+    guide_memory,
     running,
 )
 

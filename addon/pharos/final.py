@@ -17,6 +17,7 @@ from .export.camera import Crop, View, camera_fields, render_crop, render_frame
 from .export.instances import Cancelled
 from .export.report import Report
 from .export.scene import export_scene, set_view
+from .guide_memory import GuideMemory
 from .passes import PassRequest, film_passes, name_unsupported_passes, wanted_passes
 
 _POLL = 0.05  # seconds between looks at the session and at Blender's Esc
@@ -134,11 +135,13 @@ class FinalRender:
         return checkpoints.path_for(self._scene, self._layer.name, view_name)
 
     def _render(self, description, result, view_name: str) -> None:
+        memory = GuideMemory(self._engine, self._scene, self._layer.name, view_name)
         session = self._native.RenderSession(
             description,
             self._threads(),
             self._checkpoint(view_name),
             60.0 * self._scene.pharos.checkpoint_interval,
+            memory.earlier(),
         )
         try:
             self._poll(session, result)
@@ -146,6 +149,8 @@ class FinalRender:
                 self._show_result(session, result)
             self._report.add_native(session.report())
             self._finish(session)
+            if session.progress().state == self._native.SessionState.Finished:
+                self._remember(memory, session)
         finally:
             session.cancel()
             session.wait(60.0)
@@ -196,6 +201,11 @@ class FinalRender:
             )
         if self._cancelled:
             self._keep_partial(session)
+
+    def _remember(self, memory, session) -> None:
+        problem = memory.remember(session)
+        if problem:
+            self._report.warn(self._scene.name, problem)
 
     def _keep_partial(self, session) -> None:
         """Blender writes nothing when it is interrupted in background mode; a watcher may ask."""

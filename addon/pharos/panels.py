@@ -145,6 +145,7 @@ class PHAROS_RENDER_PT_advanced(_RenderPanel, bpy.types.Panel):
         mode = layout.column()
         mode.active = settings.use_guiding
         mode.prop(settings, "guiding_mode")
+        mode.prop(settings, "guide_memory")
         layout.prop(settings, "use_nee")
 
 

@@ -128,6 +128,22 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         default="NEURAL",
         update=_guiding_mode_changed,
     )
+    guide_memory: EnumProperty(
+        name="Memory",
+        description="What the network starts from. The noise of a picture depends on it, its light "
+        "does not",
+        items=(
+            ("NONE", "None", "Every picture starts from nothing"),
+            ("ANIMATION", "Animation", "Each frame of an animation starts from the one before"),
+            (
+                "FILE",
+                "File",
+                "Final renders start from what earlier ones have left in a file beside the .blend, "
+                "on other machines too",
+            ),
+        ),
+        default="ANIMATION",
+    )
     max_bounces: _bounces("Total", "Most bounces of a light path; 0 is direct light only")
     diffuse_bounces: _bounces("Diffuse", "Most diffuse reflections")
     glossy_bounces: _bounces("Glossy", "Most glossy reflections")

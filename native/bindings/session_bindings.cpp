@@ -3,6 +3,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -133,9 +134,13 @@ void bind_session(py::module_& m) {
             py::init([](SceneDescription& description,
                         unsigned threads,
                         const std::string& checkpoint,
-                        double interval) {
-                const py::gil_scoped_release release;
+                        double interval,
+                        const py::bytes& field) {
                 SessionOptions options;
+                const auto bytes = std::as_bytes(std::span<const char>(std::string_view(field)));
+                options.field.assign(bytes.begin(), bytes.end());
+                options.field_learns = true;
+                const py::gil_scoped_release release;
                 options.threads = threads;
                 options.checkpoint = {checkpoint, interval, Resume::IfItFits};
                 return Holder(new RenderSession(std::move(description), std::move(options)));
@@ -145,8 +150,9 @@ void bind_session(py::module_& m) {
             py::arg("threads") = 0,
             py::arg("checkpoint") = "",
             py::arg("checkpoint_interval") = 300.0,
+            py::arg("field") = py::bytes(),
             "Takes the description over: it is empty afterwards. Goes on from the checkpoint where "
-            "it is one of this render.")
+            "it is one of this render. The guide learns on from `field`, if it fits.")
         .def("cancel", &RenderSession::cancel, FreeGuard())
         .def(
             "wait",
@@ -158,6 +164,15 @@ void bind_session(py::module_& m) {
         .def("progress", &RenderSession::progress, FreeGuard())
         .def("statistics", &RenderSession::statistics, FreeGuard())
         .def("report", &RenderSession::report, FreeGuard())
+        .def(
+            "field",
+            [](const RenderSession& session) {
+                const std::vector<std::byte> field = session.field();
+                return py::bytes(reinterpret_cast<const char*>(field.data()), field.size());
+            },
+            FloatGuard(),
+            "What the guide has learned, for another render; empty before the end and without a "
+            "guide.")
         .def_property_readonly("width", &RenderSession::width)
         .def_property_readonly("height", &RenderSession::height)
         .def("read",

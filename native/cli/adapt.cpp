@@ -20,18 +20,6 @@ struct Options : CommonOptions {
     std::vector<std::uint32_t> size;
 };
 
-Vec3 parse_offset(const std::string& name, const std::string& text) {
-    const std::vector<std::string> parts = split(text, ',');
-    if (parts.size() != 3) {
-        throw UsageError(name + ": '" + text + "' is not X,Y,Z");
-    }
-    Vec3 offset;
-    for (int axis = 0; axis < 3; ++axis) {
-        offset[axis] = parse_number<float>(name, parts[static_cast<std::size_t>(axis)]);
-    }
-    return offset;
-}
-
 void parse_option(const std::string& name, const std::string& value, Options& options) {
     AdaptationSettings& a = options.adaptation;
     if (options.take(name, value)) {
@@ -40,7 +28,7 @@ void parse_option(const std::string& name, const std::string& value, Options& op
     if (name == "--lamp") {
         a.lamp = value;
     } else if (name == "--move") {
-        a.offset = parse_offset(name, value);
+        a.offset = parse_vector(name, value);
     } else if (name == "--frames") {
         a.frames = std::max(parse_number<std::uint32_t>(name, value), 2u);
     } else if (name == "--learned") {
@@ -54,12 +42,6 @@ void parse_option(const std::string& name, const std::string& value, Options& op
     } else {
         throw UsageError("unknown option '" + name + "'");
     }
-}
-
-void set_size(FilmDescription& film, const std::vector<std::uint32_t>& size) {
-    film.width = film.crop_width = size[0];
-    film.height = film.crop_height = size[1];
-    film.crop_x = film.crop_y = 0;
 }
 
 // One frame's errors along a line, from the least to the largest of all by their logarithms.
@@ -141,7 +123,7 @@ int adapt(const std::vector<std::string>& arguments) {
     SceneDescription description = read_dump(options.input);
     options.apply(description.settings);
     if (!options.size.empty()) {
-        set_size(description.film, options.size);
+        set_size(description.film, options.size[0], options.size[1]);
     }
     print(measure_adaptation(description, options.adaptation));
     return 0;

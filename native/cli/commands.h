@@ -30,6 +30,7 @@ int render(const std::vector<std::string>& arguments);
 int field(const std::vector<std::string>& arguments);
 int settle(const std::vector<std::string>& arguments);
 int adapt(const std::vector<std::string>& arguments);
+int animate(const std::vector<std::string>& arguments);
 int merge(const std::vector<std::string>& arguments);
 
 }  // namespace pharos::cli

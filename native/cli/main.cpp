@@ -58,6 +58,13 @@ constexpr const char* kUsage =
     "  --seconds N,N,...  CPU seconds over threads (default: 1,2,4,8)\n"
     "  --turns N          of each (default: 2)\n"
     "  --reference, --size, --seed, --threads, --nee as above\n"
+    "       pharos-cli animate FILE --move X,Y,Z [options]\n"
+    "  error x CPU time of the frames of an animation in which a lamp moves: the guide goes on "
+    "from\n"
+    "  frame to frame, or starts from nothing in each\n"
+    "  --frames N         (default: 24)\n"
+    "  --cut              the lamp moves all the way at once, in the middle\n"
+    "  --lamp, --samples, --reference, --size, --seed, --threads, --nee as above\n"
     "exit codes: 0 done, 1 error, 2 wrong arguments, 3 missing image (--strict), 4 out of memory,\n"
     "5 not written, 130 interrupted, 143 terminated (both write OUT)\n";
 
@@ -70,7 +77,8 @@ constexpr Command kCommands[] = {{"render", pharos::cli::render},
                                  {"merge", pharos::cli::merge},
                                  {"field", pharos::cli::field},
                                  {"adapt", pharos::cli::adapt},
-                                 {"settle", pharos::cli::settle}};
+                                 {"settle", pharos::cli::settle},
+                                 {"animate", pharos::cli::animate}};
 
 }  // namespace
 

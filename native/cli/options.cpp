@@ -37,6 +37,18 @@ std::vector<std::uint32_t> parse_list(const std::string& name, const std::string
     return values;
 }
 
+Vec3 parse_vector(const std::string& name, const std::string& text) {
+    const std::vector<std::string> parts = split(text, ',');
+    if (parts.size() != 3) {
+        throw UsageError(name + ": '" + text + "' is not X,Y,Z");
+    }
+    Vec3 value;
+    for (int axis = 0; axis < 3; ++axis) {
+        value[axis] = parse_number<float>(name, parts[static_cast<std::size_t>(axis)]);
+    }
+    return value;
+}
+
 bool parse_switch(const std::string& name, const std::string& text) {
     if (text != "on" && text != "off") {
         throw UsageError(name + ": '" + text + "' is neither on nor off");
@@ -60,6 +72,12 @@ GuidingMode parse_guiding(const std::string& text) {
 
 const char* guiding_name(GuidingMode mode) {
     return kGuidingNames[static_cast<std::size_t>(mode)];
+}
+
+void set_size(FilmDescription& film, std::uint32_t width, std::uint32_t height) {
+    film.width = film.crop_width = width;
+    film.height = film.crop_height = height;
+    film.crop_x = film.crop_y = 0;
 }
 
 std::vector<std::byte> read_bytes(const std::string& path) {

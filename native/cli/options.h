@@ -28,6 +28,7 @@ template <class T>
 [[nodiscard]] std::vector<std::string> split(const std::string& text, char separator);
 [[nodiscard]] std::vector<std::uint32_t> parse_list(const std::string& name,
                                                     const std::string& text);
+[[nodiscard]] Vec3 parse_vector(const std::string& name, const std::string& text);  // X,Y,Z
 [[nodiscard]] bool parse_switch(const std::string& name, const std::string& text);
 [[nodiscard]] GuidingMode parse_guiding(const std::string& text);
 [[nodiscard]] const char* guiding_name(GuidingMode mode);
@@ -49,6 +50,9 @@ struct CommonOptions {
     [[nodiscard]] bool take(const std::string& name, const std::string& value);
     void apply(RenderSettings& settings) const;
 };
+
+// All of a picture of this size.
+void set_size(FilmDescription& film, std::uint32_t width, std::uint32_t height);
 
 // Throws std::runtime_error where there is nothing to read, and WriteError.
 [[nodiscard]] std::vector<std::byte> read_bytes(const std::string& path);

@@ -95,10 +95,7 @@ int settle(const std::vector<std::string>& arguments) {
     SceneDescription description = read_dump(options.input);
     options.apply(description.settings);
     if (!options.size.empty()) {
-        FilmDescription& film = description.film;
-        film.width = film.crop_width = options.size[0];
-        film.height = film.crop_height = options.size[1];
-        film.crop_x = film.crop_y = 0;
+        set_size(description.film, options.size[0], options.size[1]);
     }
     const Settling settling = measure_settling(description, options.settling);
     print(settling, options.settling);

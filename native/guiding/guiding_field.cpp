@@ -53,6 +53,14 @@ const GuidingConfig& GuidingField::config() const {
     return impl_->layout.config;
 }
 
+Bounds3 GuidingField::box() const {
+    Bounds3 box;
+    const Vec3 half = 1.0f / impl_->state.inverse_half_extent;
+    box.extend(impl_->state.center - half);
+    box.extend(impl_->state.center + half);
+    return box;
+}
+
 std::vector<std::byte> GuidingField::save() const {
     return save_state(impl_->layout, impl_->state);
 }

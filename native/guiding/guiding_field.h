@@ -83,6 +83,7 @@ class GuidingField {
     // Number of published snapshots; 0 means that the field has learned nothing yet.
     [[nodiscard]] std::uint64_t generation() const;
     [[nodiscard]] const GuidingConfig& config() const;
+    [[nodiscard]] Bounds3 box() const;  // whose positions are the network's -1 ... 1
 
     // Weights and optimiser state as a flat file image: versioned, checksummed. load() throws
     // std::invalid_argument naming what is wrong and then leaves the field as it was.

@@ -90,16 +90,6 @@ std::vector<float> render_reference(SceneDescription description,
     return frame;
 }
 
-LightDescription& find_lamp(SceneDescription& description, const std::string& name) {
-    const auto found = std::ranges::find_if(description.lights, [&](const LightDescription& lamp) {
-        return name.empty() || lamp.name == name;
-    });
-    if (found == description.lights.end()) {
-        throw std::invalid_argument("no lamp '" + name + "' in the scene");
-    }
-    return *found;
-}
-
 void add_to(std::vector<double>& sum, const std::vector<double>& values) {
     sum.resize(values.size());
     std::ranges::transform(sum, values, sum.begin(), std::plus());
@@ -144,6 +134,16 @@ void measure_seed(const Scene& before, const Scene& after, const Move& move, Ada
 }
 
 }  // namespace
+
+LightDescription& find_lamp(SceneDescription& description, const std::string& name) {
+    const auto found = std::ranges::find_if(description.lights, [&](const LightDescription& lamp) {
+        return name.empty() || lamp.name == name;
+    });
+    if (found == description.lights.end()) {
+        throw std::invalid_argument("no lamp '" + name + "' in the scene");
+    }
+    return *found;
+}
 
 std::size_t Adaptation::frames_until(const std::vector<double>& errors, double factor) const {
     for (std::size_t i = 0; i + 1 < errors.size(); ++i) {

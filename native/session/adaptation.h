@@ -36,7 +36,10 @@ struct Adaptation {
     [[nodiscard]] std::size_t frames_until(const std::vector<double>& errors, double factor) const;
 };
 
-// Throws std::invalid_argument without such a lamp.
+// The lamp of this name, the first for none. Throws std::invalid_argument without such a lamp.
+[[nodiscard]] LightDescription& find_lamp(SceneDescription& description, const std::string& name);
+
+// Throws as find_lamp().
 [[nodiscard]] Adaptation measure_adaptation(const SceneDescription& description,
                                             const AdaptationSettings& settings);
 

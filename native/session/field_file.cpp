@@ -28,4 +28,20 @@ void freeze_field(std::span<const std::byte> bytes, GuidingMode mode, GuideContr
     });
 }
 
+GuideController continue_field(std::span<const std::byte> bytes, const NextPicture& next) {
+    GuideController guide(next.mode, next.scene_box, next.pixels);
+    parse_state_file(bytes, kField, [&](StateReader& in) {
+        std::uint32_t stored = 0;
+        in(stored);
+        if (stored != static_cast<std::uint32_t>(next.mode)) {
+            throw StateError("it was made with another guide");
+        }
+        guide.load_earlier(in);
+    });
+    if (!guide.serves(next.scene_box)) {
+        throw StateError("it was made for a scene of another size or place");
+    }
+    return guide;
+}
+
 }  // namespace pharos

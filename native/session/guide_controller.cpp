@@ -51,6 +51,15 @@ constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
 // and its sum over all records must be that of what arrived within this factor.
 constexpr double kMaxCalibration = 4.0;
 
+// A frame that goes on from another learns as from this pass on: it starts guided, and with as many
+// records as a start takes. With those of later passes it follows a lamp that moves too slowly.
+constexpr std::uint32_t kPassGoneOnFrom = 2;
+
+// The field sees positions in units of the box it was made for; far out of it, or in a small part,
+// it cannot tell them apart.
+constexpr float kMaxGrowth = 2.0f;
+constexpr float kMinPart = 0.25f;
+
 }  // namespace
 
 GuidingConfig guiding_config(GuidingMode mode) {
@@ -73,6 +82,7 @@ GuidingConfig guiding_config(GuidingMode mode) {
 
 GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels)
     : enabled_(mode != GuidingMode::Off && !scene_box.empty()),
+      box_(scene_box),
       pixels_(pixels),
       record_probability_(pixels < 65536 ? 1.0f : kFirstRecordProbability) {
     status_.enabled = enabled_;
@@ -89,6 +99,7 @@ void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixe
     if (!enabled_) {
         return;
     }
+    box_ = scene_box;
     pixels_ = pixels;
     pixel_estimate_.clear();
     weights_ = PassWeights();
@@ -112,7 +123,7 @@ std::array<double, 2> GuideController::weight(std::uint32_t first_sample) const 
 }
 
 std::uint32_t GuideController::most_samples(std::uint32_t done) const {
-    if (!learning()) {
+    if (!learning() && (frozen_ || !enabled_ || !continued_ || done > 1)) {
         return std::numeric_limits<std::uint32_t>::max();
     }
     return std::max<std::uint32_t>(1, done / (hard_ ? kHardPassPart : kEasyPassPart));
@@ -122,6 +133,13 @@ void GuideController::see(const Film& film, std::uint32_t done) {
     // SLIDES guides from pass 1 on: what it shows there is no longer independent of pass 0.
     if (selection_ && !frozen_) {
         weights_.see(film, done);
+        if (continued_ && done == 2 && !hard_ && weights_.hard()) {
+            // Another scene than the easy one before, after a cut say: its trial begins.
+            hard_ = true;
+            status_.closed = false;
+            selection_.emplace(box_);
+            pass_ = std::min(pass_, kPassGoneOnFrom);
+        }
     }
 }
 
@@ -204,7 +222,8 @@ void GuideController::learn(RecordBuffer records,
         const double per_probability = recorded / static_cast<double>(record_probability_);
         record_probability_ = static_cast<float>(std::clamp(wanted / per_probability, 0.005, 1.0));
     }
-    if (pass_ < (hard_ ? kEstimateEveryPass : kEasyEstimateEveryPass) || pass_ % 4 == 0) {
+    if (pass_ < (hard_ ? kEstimateEveryPass : kEasyEstimateEveryPass) || pass_ % 4 == 0 ||
+        pixel_estimate_.empty()) {
         pixel_estimate_ = estimate_pixels(film);
     }
     ++pass_;
@@ -267,6 +286,26 @@ void GuideController::load_frozen(StateReader& in) {
         pixel_estimate_.clear();
     }
     frozen_ = true;
+}
+
+void GuideController::load_earlier(StateReader& in) {
+    read_state(in);
+    pixel_estimate_.clear();
+    weights_ = {};
+    frozen_ = false;
+    continued_ = field_ && field_->generation() > 0;
+    pass_ = std::min(pass_, kPassGoneOnFrom);
+}
+
+bool GuideController::serves(const Bounds3& scene_box) const {
+    if (!field_) {
+        return true;
+    }
+    const Bounds3 box = field_->box();
+    const Vec3 joint = glm::max(box.upper, scene_box.upper) - glm::min(box.lower, scene_box.lower);
+    const float own = max_component(box.extent());
+    return max_component(joint) <= kMaxGrowth * own &&
+           max_component(scene_box.extent()) >= kMinPart * own;
 }
 
 // A is only an adjoint where what it expects arrives.

@@ -77,6 +77,13 @@ class GuideController {
     // picture may be taken apart. What was learned about another picture's pixels is left out.
     void load_frozen(StateReader& in);
 
+    // Takes the state of a controller of the same mode at the end of an earlier picture, the frame
+    // before in an animation, and goes on from it: what was proven holds until it is disproved.
+    void load_earlier(StateReader& in);
+
+    // Whether the field, made for another box perhaps, can tell the places of this one apart.
+    [[nodiscard]] bool serves(const Bounds3& scene_box) const;
+
   private:
     void calibrate(const std::array<double, 2>& calibration);
     void judge_hardness(const SelectionStatistics& selected);
@@ -85,6 +92,7 @@ class GuideController {
 
     bool enabled_;
     bool frozen_ = false;
+    Bounds3 box_;  // of the scene
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
     bool continued_ = false;  // from an earlier picture

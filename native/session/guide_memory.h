@@ -28,7 +28,6 @@ class GuideMemory {
 
     std::optional<GuideController> guide_;
     GuidingMode mode_ = GuidingMode::Off;
-    Bounds3 box_;  // the field's
     bool kept_ = false;
 };
 

@@ -62,7 +62,8 @@ using Clock = std::chrono::steady_clock;
         std::numeric_limits<std::uint32_t>::max() - options.sample_offset) {
         return "The samples reach beyond what can be counted.";
     }
-    if (!options.field.empty() && description.settings.guiding == GuidingMode::Off) {
+    if (!options.field.empty() && !options.field_learns &&
+        description.settings.guiding == GuidingMode::Off) {
         return "There is a guide to load, but guiding is off.";
     }
     return {};
@@ -83,6 +84,11 @@ using Clock = std::chrono::steady_clock;
     identity.width = description.film.crop_width;
     identity.height = description.film.crop_height;
     return identity;
+}
+
+// The guide learns on from an earlier render's.
+[[nodiscard]] bool goes_on(const SessionOptions& options, GuidingMode mode) {
+    return options.field_learns && !options.field.empty() && mode != GuidingMode::Off;
 }
 
 [[nodiscard]] SessionOptions with_threads(unsigned threads) {
@@ -142,7 +148,7 @@ struct RenderSession::Impl {
     void run(SceneDescription description);
     void run_built(const BuiltScene& built);
     void render(const Scene& scene, const RenderIdentity& identity, const BuiltScene* built);
-    [[nodiscard]] GuideController make_guide(const Scene& scene) const;
+    [[nodiscard]] GuideController make_guide(const Scene& scene);
     void resume(const Scene& scene, const CheckpointKeeper& keeper, Work& work);
     void begin(const Scene& scene, const Work& work);
     void render_passes(const RenderSettings& settings, CheckpointKeeper& keeper, Work& work);
@@ -215,6 +221,11 @@ void RenderSession::Impl::run(SceneDescription description) {
             throw std::bad_alloc();
         }
         const RenderIdentity identity = identify(description, options);
+        if (goes_on(options, description.settings.guiding)) {
+            // Samples that do not know those which the guide has learned from.
+            description.settings.seed ^=
+                static_cast<std::uint32_t>(fnv1a(std::span(options.field)));
+        }
         const auto scene = build_scene(std::move(description), cancel, build_report);
         {
             const std::lock_guard lock(mutex);
@@ -245,11 +256,19 @@ void RenderSession::Impl::run_built(const BuiltScene& built) {
     }
 }
 
-GuideController RenderSession::Impl::make_guide(const Scene& scene) const {
-    const GuidingMode mode = scene.description.settings.guiding;
-    GuideController guide(mode, scene.bounds, std::uint64_t{width} * height);
-    if (!options.field.empty()) {
-        freeze_field(options.field, mode, guide);
+GuideController RenderSession::Impl::make_guide(const Scene& scene) {
+    const NextPicture next{
+        scene.description.settings.guiding, scene.bounds, std::uint64_t{width} * height};
+    if (goes_on(options, next.mode)) {
+        try {
+            return continue_field(options.field, next);
+        } catch (const StateError& error) {
+            note(Severity::Info, "Path guiding", std::string("Learned anew: ") + error.what());
+        }
+    }
+    GuideController guide(next.mode, next.scene_box, next.pixels);
+    if (!options.field_learns && !options.field.empty()) {
+        freeze_field(options.field, next.mode, guide);
     }
     return guide;
 }

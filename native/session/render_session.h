@@ -74,8 +74,10 @@ struct SessionOptions {
     // The film's first sample in each pixel's sequence: shards of one picture start where the one
     // before ends.
     std::uint32_t sample_offset = 0;
-    // Of an earlier render (RenderSession::field()): guides all passes alike and learns no more.
+    // Of an earlier render (RenderSession::field()): guides all passes alike and learns no more, or
+    // goes on learning from where it was, or, where it does not fit, starts anew and reports why.
     std::vector<std::byte> field;
+    bool field_learns = false;
     CheckpointOptions checkpoint;
 };
 

@@ -73,6 +73,8 @@ void read_field(std::span<const std::byte> bytes) {
         GuideController guide = new_guide();
         freeze_field(bytes, kMode, guide);
         use(guide);
+        GuideController learning = continue_field(bytes, {kMode, box(), kSize * kSize});
+        use(learning);
     } catch (const StateError&) {
         return;
     }

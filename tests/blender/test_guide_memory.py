@@ -1,0 +1,94 @@
+"""What the network has learned goes on from frame to frame, and from file to file where asked."""
+# hosts: blender bpy
+
+import bpy
+import harness
+import numpy as np
+
+_FOLDER = harness.TEMPORARY / "memory"
+
+
+def _scene(memory: str):
+    """A box that a lamp behind a screen lights, so that there is something to learn."""
+    scene = harness.new_scene(32, 32, 24)
+    scene.pharos.guiding, scene.pharos.guide_memory = "NEURAL", memory
+    white = harness.material("White")
+    shader = harness.node(white, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
+    harness.connect(white, shader.outputs[0], harness.surface(white))
+    room = harness.add_object(harness.cube_mesh("Room"), white)
+    room.scale = (3.0, 3.0, 3.0)
+    harness.add_object(harness.plane_mesh("Screen", 0.6), white, location=(0.0, 0.0, 2.0))
+    light = bpy.data.lights.new("Lamp", "POINT")
+    light.energy, light.shadow_soft_size = 100.0, 0.1
+    lamp = harness.link(bpy.data.objects.new("Lamp", light))
+    lamp.location = (0.0, 0.0, 2.5)
+    lamp.keyframe_insert("location", frame=1)
+    lamp.location = (0.3, 0.0, 2.5)
+    lamp.keyframe_insert("location", frame=3)
+    harness.add_camera(location=(0.0, -2.6, 0.0), rotation=(1.57, 0.0, 0.0))
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    return scene
+
+
+def _frames(scene, name: str) -> list[np.ndarray]:
+    folder = _FOLDER / name
+    folder.mkdir(parents=True, exist_ok=True)
+    scene.render.filepath = f"{folder}/"
+    bpy.ops.render.render(animation=True)
+    return [harness.read_exr(path) for path in sorted(folder.glob("*.exr"))]
+
+
+def _still(scene, frame: int, name: str) -> np.ndarray:
+    scene.frame_set(frame)
+    path = _FOLDER / f"{name}.exr"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return harness.read_exr(path)
+
+
+def test_frames_of_an_animation_go_on():
+    scene = _scene("ANIMATION")
+    frames = _frames(scene, "animation")
+    again = _frames(scene, "again")
+    assert len(frames) == len(again) == 3
+    for a, b in zip(frames, again):
+        assert np.array_equal(a, b), "the same animation gives other frames"
+    assert np.array_equal(_still(scene, 1, "still1"), frames[0])
+    still = _still(scene, 2, "still2")
+    assert not np.array_equal(still, frames[1]), "the second frame starts from nothing"
+    assert abs(still.mean() / frames[1].mean() - 1.0) < 0.1
+    assert np.array_equal(_still(scene, 2, "repeated"), still)
+    assert not list(_FOLDER.rglob("*.pharos_guide"))
+
+
+def test_none_starts_from_nothing():
+    scene = _scene("NONE")
+    frames = _frames(scene, "none")
+    for i, frame in enumerate(frames):
+        assert np.array_equal(_still(scene, i + 1, f"none{i}"), frame)
+
+
+def test_file_beside_the_blend():
+    _FOLDER.mkdir(parents=True, exist_ok=True)
+    scene = _scene("FILE")
+    blend = _FOLDER / "room.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=False)
+    scene = bpy.context.scene
+    first = _still(scene, 1, "first")
+    files = list(_FOLDER.glob("*.pharos_guide"))
+    assert len(files) == 1 and files[0].name.startswith("room."), files
+    second = _still(scene, 1, "second")
+    assert not np.array_equal(first, second)
+    # What is no guide is said and learned over.
+    files[0].write_bytes(b"no guide")
+    assert np.abs(_still(scene, 1, "third").mean() / first.mean() - 1.0) < 0.1
+    said = harness.report()
+    assert any("Learned anew" in line for line in said), said
+    assert files[0].stat().st_size > 1000
+    files[0].unlink()
+    assert np.array_equal(_still(scene, 1, "fourth"), first)
+
+
+harness.main(globals())
