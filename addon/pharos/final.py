@@ -199,6 +199,8 @@ class FinalRender:
             self._report.warn(
                 self._scene.name, f"{progress.nonfinite_samples} samples were not finite numbers."
             )
+        if self._layer.pharos.use_pass_effort and not self._engine.is_preview:
+            handlers.post_slow(self._scene.name, session.effort())
         if self._cancelled:
             self._keep_partial(session)
 

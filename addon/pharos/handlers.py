@@ -34,11 +34,28 @@ def write_report(scene, entries) -> None:
             setattr(item, field, value)
 
 
-def post_report(scene_name: str, entries) -> None:
-    """Hand a report to the scene of that name, from any thread."""
-    _waiting.put((scene_name, entries))
+def write_slow(scene, rows) -> None:
+    """Replace the list of what made a scene's picture slow: (kind, name, share)."""
+    scene.pharos.slow.clear()
+    for kind, name, share in rows:
+        item = scene.pharos.slow.add()
+        item.kind, item.name, item.share = kind, name, share
+
+
+def _post(write, scene_name: str, what) -> None:
+    _waiting.put((write, scene_name, what))
     if bpy.app.background:
         _deliver()
+
+
+def post_report(scene_name: str, entries) -> None:
+    """Hand a report to the scene of that name, from any thread."""
+    _post(write_report, scene_name, entries)
+
+
+def post_slow(scene_name: str, rows) -> None:
+    """Hand it what made its picture slow, likewise."""
+    _post(write_slow, scene_name, rows)
 
 
 def edit_epoch() -> int:
@@ -64,10 +81,10 @@ def _epoch_handlers() -> list:
 
 def _deliver() -> float:
     while not _waiting.empty():
-        scene_name, entries = _waiting.get()
+        write, scene_name, what = _waiting.get()
         scene = bpy.data.scenes.get(scene_name)
         if scene is not None:
-            write_report(scene, entries)
+            write(scene, what)
     return 0.5
 
 

@@ -249,9 +249,39 @@ class PHAROS_VIEW_LAYER_PT_passes(_PharosPanel, bpy.types.Panel):
         column = layout.column(heading="Sampling", align=True)
         column.prop(view_layer.pharos, "use_pass_denoising")
         column.prop(view_layer.pharos, "use_pass_sample_count")
+        column.prop(view_layer.pharos, "use_pass_effort")
         column = layout.column(heading="Path Guiding", align=True)
         for name in ("direction", "kappa", "irradiance", "share"):
             column.prop(view_layer.pharos, f"use_pass_guide_{name}")
+
+
+class PHAROS_VIEW_LAYER_PT_slow(_PharosPanel, bpy.types.Panel):
+    """Where the time of the last render went."""
+
+    bl_label = "What Is Slow"
+    bl_context = "view_layer"
+    bl_parent_id = "PHAROS_VIEW_LAYER_PT_passes"
+    _ICONS = {"OBJECT": "OBJECT_DATA", "LIGHT": "LIGHT", "WORLD": "WORLD"}
+    _MOST_ROWS = 8  # of each kind
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.view_layer.pharos.use_pass_effort
+
+    def draw(self, context):
+        layout = self.layout
+        rows = context.scene.pharos.slow
+        if not rows:
+            layout.label(text="Render to see what takes the time.", icon="INFO")
+        for heading, kinds in (("Seen on", {"OBJECT"}), ("Lit by", {"LIGHT", "WORLD"})):
+            column = layout.column(align=True)
+            shown = [row for row in rows if row.kind in kinds][: self._MOST_ROWS]
+            if shown:
+                column.label(text=heading)
+            for row in shown:
+                line = column.split(factor=0.75)
+                line.label(text=row.name, icon=self._ICONS[row.kind])
+                line.label(text=f"{100.0 * row.share:.1f} %")
 
 
 def draw_node_socket(layout, owner, output_type: str, socket: str) -> None:
@@ -417,6 +447,7 @@ _CLASSES = (
     PHAROS_RENDER_PT_performance,
     PHAROS_RENDER_PT_report,
     PHAROS_VIEW_LAYER_PT_passes,
+    PHAROS_VIEW_LAYER_PT_slow,
     PHAROS_MATERIAL_PT_slots,
     PHAROS_MATERIAL_PT_surface,
     PHAROS_MATERIAL_PT_settings,

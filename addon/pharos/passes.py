@@ -58,6 +58,7 @@ PASSES = (
     Pass("DenoisingNormal", "Denoising Normal", "XYZ", "VECTOR", "pharos.use_pass_denoising"),
     Pass("DenoisingAlbedo", "Denoising Albedo", "RGB", "COLOR", "pharos.use_pass_denoising"),
     Pass("SampleCount", "Debug Sample Count", "X", "VALUE", "pharos.use_pass_sample_count"),
+    Pass("Effort", "Effort", "X", "VALUE", "pharos.use_pass_effort"),
     Pass("GuideDirection", "Guide Direction", "XYZ", "VECTOR", "pharos.use_pass_guide_direction"),
     Pass("GuideKappa", "Guide Kappa", "X", "VALUE", "pharos.use_pass_guide_kappa"),
     Pass("GuideIrradiance", "Guide Irradiance", "X", "VALUE", "pharos.use_pass_guide_irradiance"),

@@ -38,6 +38,25 @@ class PharosReportEntry(bpy.types.PropertyGroup):
     missing: BoolProperty(name="Missing", description="A file is not there or cannot be used")
 
 
+class PharosEffortRow(bpy.types.PropertyGroup):
+    """Something that makes the picture slow; its name is that of the object or light."""
+
+    kind: EnumProperty(
+        items=(
+            ("OBJECT", "Object", "Where the camera sees it"),
+            ("LIGHT", "Light", "What lights it"),
+            ("WORLD", "World", "The world's light"),
+        )
+    )
+    share: FloatProperty(
+        name="Share",
+        description="Of the effort of all objects, or of all lights",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+    )
+
+
 def _bounces(name: str, description: str, default: int = 12):
     return IntProperty(name=name, description=description, default=default, min=0, max=1024)
 
@@ -218,6 +237,12 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         description="What the last render could not take as given (read only)",
         type=PharosReportEntry,
     )
+    slow: CollectionProperty(
+        name="What Is Slow",
+        description="Objects and lights that made the last picture with the pass of that name slow: "
+        "variance times cost (read only)",
+        type=PharosEffortRow,
+    )
     report_row: IntProperty(name="Report Row", options={"HIDDEN", "SKIP_SAVE"})
 
 
@@ -229,6 +254,11 @@ class PharosViewLayerSettings(bpy.types.PropertyGroup):
     )
     use_pass_sample_count: _pass_switch(
         "Sample Count", "Deliver the number of samples of each pixel"
+    )
+    use_pass_effort: _pass_switch(
+        "What Is Slow",
+        "Deliver how much noise a pixel makes and what its samples cost, and list the objects and "
+        "lights that make the picture slow",
     )
     use_pass_guide_direction: _pass_switch(
         "Direction", "Deliver the mean direction of the light that the guide has learned"
@@ -246,7 +276,7 @@ class PharosViewLayerSettings(bpy.types.PropertyGroup):
     )
 
 
-_CLASSES = (PharosReportEntry, PharosSceneSettings, PharosViewLayerSettings)
+_CLASSES = (PharosReportEntry, PharosEffortRow, PharosSceneSettings, PharosViewLayerSettings)
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)

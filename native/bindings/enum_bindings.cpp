@@ -152,7 +152,8 @@ void bind_passes(py::module_& m) {
                            {"GlossyColor", FilmPass::GlossyColor},
                            {"TransmissionDirect", FilmPass::TransmissionDirect},
                            {"TransmissionIndirect", FilmPass::TransmissionIndirect},
-                           {"TransmissionColor", FilmPass::TransmissionColor}});
+                           {"TransmissionColor", FilmPass::TransmissionColor},
+                           {"Effort", FilmPass::Effort}});
     m.def("film_pass_channels", &film_pass_channels, FloatGuard(), py::arg("film_pass"));
     m.def("pass_bit", &pass_bit, FloatGuard(), py::arg("film_pass"));
 }

@@ -1,4 +1,5 @@
 // Render sessions: start, poll, read, cancel.
+#include <array>
 #include <chrono>
 #include <span>
 #include <stdexcept>
@@ -108,6 +109,8 @@ void write_passes(const std::string& path,
     }
 }
 
+constexpr std::array<const char*, 3> kKinds{"OBJECT", "LIGHT", "WORLD"};  // EffortKind
+
 // The destructor cancels and joins: other Python threads must be able to run meanwhile.
 struct FreeDelete {
     void operator()(RenderSession* session) const {
@@ -164,6 +167,20 @@ void bind_session(py::module_& m) {
         .def("progress", &RenderSession::progress, FreeGuard())
         .def("statistics", &RenderSession::statistics, FreeGuard())
         .def("report", &RenderSession::report, FreeGuard())
+        .def(
+            "effort",
+            [](const RenderSession& session) {
+                py::list rows;
+                for (const EffortShare& row : session.effort()) {
+                    rows.append(py::make_tuple(
+                        kKinds[static_cast<std::size_t>(row.kind)], row.name, row.share));
+                }
+                return rows;
+            },
+            FloatGuard(),
+            "(kind, name, share) of what made the picture slow: OBJECT by what the camera sees, "
+            "LIGHT and WORLD by where it is lit from; the largest first. Empty before the end and "
+            "without the pass Effort.")
         .def(
             "field",
             [](const RenderSession& session) {

@@ -162,6 +162,14 @@ void print_guide(const GuideStatus& guide) {
                 static_cast<unsigned long long>(guide.skipped_steps));
 }
 
+// What made the picture slow, where its pass was asked for.
+void print_effort(const RenderSession& session) {
+    for (const EffortShare& row : session.effort()) {
+        const char* kind = row.kind == EffortKind::Object ? "at" : "by";
+        std::printf("effort %s %-32s %6.2f%%\n", kind, row.name.c_str(), 100.0 * row.share);
+    }
+}
+
 void write_statistics_json(const RenderSession& session,
                            double read_seconds,
                            const std::string& path) {
@@ -310,6 +318,7 @@ int render(const std::vector<std::string>& arguments) {
     if (options.stats) {
         print_statistics(session);
         print_guide(session.progress().guiding);
+        print_effort(session);
     }
     if (!options.stats_json.empty()) {
         write_statistics_json(session, read_seconds, options.stats_json);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/color.h"
 
 namespace pharos {
 
@@ -198,6 +199,14 @@ void Film::load(StateReader& in) {
         in.expect(*values);
     }
     in.expect(count_);
+}
+
+double Film::mean_luminance(std::uint32_t pixel) const {
+    const double* rgb = &sum_[std::size_t{4} * pixel];
+    return static_cast<double>(luminance(Rgb(static_cast<float>(rgb[0]),
+                                             static_cast<float>(rgb[1]),
+                                             static_cast<float>(rgb[2])))) /
+           weight_[pixel];
 }
 
 void Film::clear() {

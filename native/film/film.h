@@ -71,6 +71,9 @@ class Film {
     // Samples of a pixel so far.
     [[nodiscard]] std::uint32_t samples(std::uint32_t pixel) const { return count_[pixel]; }
 
+    // Of what was added to a pixel, without exposure; it must have samples.
+    [[nodiscard]] double mean_luminance(std::uint32_t pixel) const;
+
     // All that was added. load() takes the state of a film of the same description and passes;
     // throws StateError, and is then to be thrown away.
     void save(StateWriter& out) const;

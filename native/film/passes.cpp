@@ -35,6 +35,7 @@ constexpr std::array<FilmPassInfo, kFilmPasses> kInfos{{
     {"Transmission Direct", "RGB", PassKind::Average, true},
     {"Transmission Indirect", "RGB", PassKind::Average, true},
     {"Transmission Color", "RGB", PassKind::Average, false},
+    {"Effort", "X", PassKind::Average, false},
 }};
 
 }  // namespace

@@ -46,6 +46,7 @@ enum class FilmPass : std::uint8_t {
     TransmissionDirect,
     TransmissionIndirect,
     TransmissionColor,
+    Effort,  // variance times cost: squared difference from the mean, times rays
     Count
 };
 

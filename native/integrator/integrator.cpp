@@ -78,9 +78,11 @@ void Integrator::follow_paths(const RenderContext& context, Worker& worker) cons
     BatchStatistics& statistics = worker.statistics;
     LightSplit& split = worker.split;
     split.begin(context, batch);
+    worker.effort.begin(context, batch);
     while (!batch.active.empty()) {
         statistics.rays += batch.active.size();
         worker.timed(Stage::IntersectClosest, [&] { return intersect_closest(context, batch); });
+        worker.effort.take_hits(batch);
         worker.timed(Stage::AddLampRadiance, [&] { return add_lamp_radiance(context, batch); });
         worker.timed(Stage::AddEscapedRadiance,
                      [&] { return add_escaped_radiance(context, batch); });
@@ -96,6 +98,7 @@ void Integrator::follow_paths(const RenderContext& context, Worker& worker) cons
         worker.timed(Stage::SampleDirectLight, [&] { return sample_direct_light(context, batch); });
         statistics.rays += batch.shadow_rays.size();
         split.before_shadow_rays(context, batch);
+        worker.effort.take_shadow_rays(batch);
         worker.timed(Stage::TraceShadowRays, [&] { return trace_shadow_rays(context, batch); });
         split.after_shadow_rays(context, batch);
         worker.timed(Stage::SampleScattering, [&] { return sample_scattering(context, batch); });
@@ -178,6 +181,7 @@ bool Integrator::render_pass(const PassSettings& pass,
             render_batch(context, {first, count, sample}, worker);
             worker.timed(Stage::AccumulateFilm, [&] {
                 const std::shared_lock lock(film.mutex);
+                worker.effort.book(passes_, first, film.film, worker.batch);
                 add_to_film(worker.batch, pass, {first, count, sample}, passes_, film.film);
                 return count;
             });
@@ -186,6 +190,14 @@ bool Integrator::render_pass(const PassSettings& pass,
     });
     add_up();
     return complete.load();
+}
+
+std::vector<EffortShare> Integrator::effort() const {
+    EffortTally tally;
+    for (const auto& worker : workers_) {
+        tally.add(worker->effort.tally());
+    }
+    return effort_shares(tally, scene_);
 }
 
 void Integrator::add_up() {

@@ -19,6 +19,7 @@
 #include "core/cancel.h"
 #include "core/parallel.h"
 #include "film/film.h"
+#include "integrator/effort_share.h"
 #include "integrator/render_context.h"
 
 namespace pharos {
@@ -70,6 +71,9 @@ class Integrator {
     void book_training(std::uint64_t records, std::uint64_t nanoseconds);
 
     [[nodiscard]] std::uint32_t batches_per_sample() const;
+
+    // Of all passes so far, by the scene's names; empty where FilmPass::Effort is not wanted.
+    [[nodiscard]] std::vector<EffortShare> effort() const;
 
     [[nodiscard]] const BatchStatistics& statistics() const { return total_; }
 

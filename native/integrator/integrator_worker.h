@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/work_counter.h"
+#include "integrator/effort.h"
 #include "integrator/integrator.h"
 #include "integrator/light_split.h"
 #include "integrator/path_batch.h"
@@ -16,6 +17,7 @@ inline constexpr std::uint32_t kBatchPaths = 1024;
 struct Integrator::Worker {
     PathBatch batch{kBatchPaths};
     LightSplit split;
+    EffortMeter effort;
     BatchStatistics statistics;
     RecordBuffer records;
 

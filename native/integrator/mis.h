@@ -26,22 +26,35 @@ namespace pharos {
     return batch.scatter_pdf[path] > 0.0f ? &batch.origin[path] : nullptr;
 }
 
-inline void add_radiance(PathBatch& batch, std::uint32_t path, const Rgb& contribution) {
+inline void add_radiance(PathBatch& batch,
+                         std::uint32_t path,
+                         const Rgb& contribution,
+                         std::uint32_t emitter) {
     batch.radiance[path] += contribution;
+    if (batch.notes_arrivals) {
+        batch.arrivals.push_back({batch.root[path], emitter, luminance(contribution)});
+    }
     if (batch.split_scale[path] > 0.0f) {
         batch.recorded_radiance[path] += contribution * batch.split_scale[path];
     }
 }
 
-// Adds emission L met by chance to a path, and tells the record of the scattering that met it.
+// Emission met by chance, and the density next-event estimation would have had for it.
+struct Emitted {
+    Rgb L{0.0f};
+    float light_pdf = 0.0f;  // solid angle
+    std::uint32_t emitter = kNone;
+};
+
+// Adds emission met by chance to a path, and tells the record of the scattering that met it.
 inline void add_chance_hit(const RenderContext& context,
                            PathBatch& batch,
                            std::uint32_t path,
-                           const Rgb& L,
-                           float light_pdf) {
+                           const Emitted& light) {
+    const auto& [L, light_pdf, emitter] = light;
     const float weight = chance_hit_weight(context, batch.scatter_pdf[path], light_pdf);
     const Rgb contribution = batch.beta[path] * L * weight;
-    add_radiance(batch, path, contribution);
+    add_radiance(batch, path, contribution, emitter);
     if (batch.last_record[path] != kNone) {
         VertexRecord& record = batch.records[batch.last_record[path]];
         record.hit_weighted += contribution * batch.split_scale[path];
@@ -86,7 +99,7 @@ inline void add_lamp_hit(const RenderContext& context,
                           std::span(&emitted, 1));
         L *= emitted;
     }
-    add_chance_hit(context, batch, path, L, hit.pdf);
+    add_chance_hit(context, batch, path, {L, hit.pdf, hit.light});
 }
 
 }  // namespace pharos

@@ -46,6 +46,19 @@ struct ShadowRay {
     Rgb contribution{0.0f};
     std::uint32_t path = 0;
     std::uint32_t record = kNone;  // vertex record that wants to know
+    std::uint32_t emitter = kNone;
+};
+
+// Who emits: a lamp by its place in the description, a surface by its instance with this bit, or
+// the world.
+inline constexpr std::uint32_t kSurfaceEmitter = 0x80000000u;
+inline constexpr std::uint32_t kWorldEmitter = 0xfffffffeu;
+
+// Light that has reached a camera sample.
+struct Arrival {
+    std::uint32_t root = 0;
+    std::uint32_t emitter = kNone;
+    float luminance = 0.0f;
 };
 
 // Light samples whose radiance a node program gives.
@@ -72,6 +85,8 @@ struct PathBatch {
     std::vector<std::uint32_t> root_pixel;  // in the rendered window
     std::vector<FilmSample> root_sample;
     std::vector<float> root_passes;  // on request: PassLayout::sample_size() of each
+    std::vector<Arrival> arrivals;   // of all roots, while notes_arrivals
+    bool notes_arrivals = false;
 
     // --- paths ---
     std::vector<std::uint32_t> root;

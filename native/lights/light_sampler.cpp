@@ -86,6 +86,7 @@ std::optional<LightSamplerSample> LightSampler::Impl::sample_lamp_group(
     result.sample.visibility = lamp.visibility;
     result.sample.max_bounces = lamp.max_bounces;
     result.lamp = index;
+    result.light = lamp.index;
     result.program = lamp.program;
     return result;
 }

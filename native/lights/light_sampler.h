@@ -49,6 +49,7 @@ struct LightSamplerSample {
     float u = 0.0f;                        // barycentrics on it
     float v = 0.0f;
     std::uint32_t lamp = 0;               // for lamp_point()
+    std::uint32_t light = 0;              // the lamp's place in the description
     std::uint32_t program = 0xffffffffu;  // of the lamp: what it emits multiplies L
 };
 

@@ -127,6 +127,7 @@ void SceneBuild::mend() {
         attribute.values.resize(d.instances.size(), Vec4(0.0f));
     }
     const bool wants_index = (d.passes.wanted & pass_bit(FilmPass::ObjectIndex)) != 0;
+    const bool wants_place = (d.passes.wanted & pass_bit(FilmPass::Effort)) != 0;
     for (std::size_t i = 0; i < d.instances.size(); ++i) {
         if (i % kCancelPollInterval == 0) {
             poll();
@@ -137,6 +138,9 @@ void SceneBuild::mend() {
             if (wants_index) {
                 const auto& indices = d.passes.object_indices;
                 scene_->pass_index.push_back(i < indices.size() ? indices[i] : 0);
+            }
+            if (wants_place) {
+                scene_->described.push_back(static_cast<std::uint32_t>(i));
             }
             // Values of attributes move up with their instances.
             const std::size_t place = scene_->instances.size() - 1;

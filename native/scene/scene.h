@@ -41,6 +41,7 @@ struct Scene {
     std::vector<InstanceSurface> surfaces;  // of each instance
     std::vector<Bounds3> mesh_bounds;       // object space
     std::vector<std::uint32_t> pass_index;  // of each instance; empty: not asked for
+    std::vector<std::uint32_t> described;   // place in the description of each; likewise
     std::vector<Material> materials;        // one per description.materials, then the grey default
     std::vector<Material> displacements;    // of each material; without operations: none
     std::vector<Texture> textures;

@@ -141,6 +141,7 @@ struct RenderSession::Impl {
     std::uint64_t batches_per_sample = 1;
     std::optional<Clock::time_point> render_begin;
     std::vector<std::byte> field;
+    std::vector<EffortShare> effort;
 
     // Last: joins before anything it uses is destroyed.
     std::jthread driver;
@@ -331,6 +332,11 @@ void RenderSession::Impl::render(const Scene& scene,
     begin(scene, work);
     render_passes(settings, keeper, work);
     keep(keeper, work);
+    if (shared_film->film.passes().wants(FilmPass::Effort)) {
+        std::vector<EffortShare> shares = integrator.effort();
+        const std::lock_guard lock(mutex);
+        effort = std::move(shares);
+    }
     if (settings.guiding != GuidingMode::Off && built == nullptr) {
         std::vector<std::byte> bytes = field_to_bytes(work.guide, settings.guiding);
         const std::lock_guard lock(mutex);
@@ -529,6 +535,11 @@ std::vector<ReportEntry> RenderSession::report() const {
 std::vector<SessionSnapshot> RenderSession::snapshots() const {
     const std::lock_guard lock(impl_->mutex);
     return impl_->snapshots;
+}
+
+std::vector<EffortShare> RenderSession::effort() const {
+    const std::lock_guard lock(impl_->mutex);
+    return impl_->effort;
 }
 
 std::vector<std::byte> RenderSession::field() const {

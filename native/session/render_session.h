@@ -15,6 +15,7 @@
 
 #include "core/scene_report.h"
 #include "film/film.h"
+#include "integrator/effort_share.h"
 #include "scene/scene_description.h"
 #include "session/checkpoint_keeper.h"
 #include "session/guide_status.h"
@@ -124,6 +125,9 @@ class RenderSession {
     // What the guide has learned, as SessionOptions::field takes it; empty before the end and
     // without a guide.
     [[nodiscard]] std::vector<std::byte> field() const;
+
+    // What made the picture slow, after its end; empty unless FilmPass::Effort is wanted.
+    [[nodiscard]] std::vector<EffortShare> effort() const;
 
     // The passes that materials write, and their newest state: 4 or 1 floats a pixel. As read().
     [[nodiscard]] std::span<const AovDescription> aovs() const;

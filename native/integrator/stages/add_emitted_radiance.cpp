@@ -24,7 +24,8 @@ std::uint64_t add_emitted_radiance(const RenderContext& context, PathBatch& batc
             light_pdf = scene.lights->pdf_triangle(
                 *rival, surface.instance, surface.triangle, t, cos_light);
         }
-        add_chance_hit(context, batch, path, emission, light_pdf);
+        add_chance_hit(
+            context, batch, path, {emission, light_pdf, kSurfaceEmitter | surface.instance});
         ++items;
     }
     return items;

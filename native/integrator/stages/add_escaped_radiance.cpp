@@ -38,7 +38,7 @@ void add_world(const RenderContext& context, PathBatch& batch) {
         const float light_pdf = sampled && rival
                                     ? scene.lights->pdf_environment(*rival, batch.rays[i].direction)
                                     : 0.0f;
-        add_chance_hit(context, batch, path, batch.escaped_radiance[k], light_pdf);
+        add_chance_hit(context, batch, path, {batch.escaped_radiance[k], light_pdf, kWorldEmitter});
     }
 }
 

@@ -68,6 +68,13 @@ struct Receiver {
     return {receiving, widen_random(u.x, Vec2(u.y, u.z)), Vec2(u.y, u.z), {}};
 }
 
+[[nodiscard]] std::uint32_t emitter_of(const LightSamplerSample& light) {
+    if (light.environment) {
+        return kWorldEmitter;
+    }
+    return light.instance != kNone ? kSurfaceEmitter | light.instance : light.light;
+}
+
 // Samples the light that was chosen for a vertex; queues a shadow ray when something may arrive.
 void sample_light(const RenderContext& context,
                   const Receiver& receiver,
@@ -128,7 +135,7 @@ void sample_light(const RenderContext& context,
     if (record != kNone) {
         note_light_sample(guide, sample, scattering.pdf, weight, batch.records[record]);
     }
-    batch.shadow_rays.push_back({factor * L, receiver.path, record});
+    batch.shadow_rays.push_back({factor * L, receiver.path, record, emitter_of(*light)});
     if (!sample.cast_shadow) {
         ray.t_max = 0.0f;  // an empty interval is never occluded
     }

@@ -12,7 +12,7 @@ namespace pharos {
 namespace {
 
 void add_contribution(PathBatch& batch, const ShadowRay& shadow) {
-    add_radiance(batch, shadow.path, shadow.contribution);
+    add_radiance(batch, shadow.path, shadow.contribution, shadow.emitter);
     if (shadow.record != kNone) {
         VertexRecord& record = batch.records[shadow.record];
         record.selection.nee_radiance =
