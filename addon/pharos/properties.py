@@ -239,8 +239,8 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
     )
     slow: CollectionProperty(
         name="What Is Slow",
-        description="Objects and lights that made the last picture with the pass of that name slow: "
-        "variance times cost (read only)",
+        description="Objects and lights that made the last picture with the pass of that name "
+        "slow: variance times cost (read only)",
         type=PharosEffortRow,
     )
     report_row: IntProperty(name="Report Row", options={"HIDDEN", "SKIP_SAVE"})
