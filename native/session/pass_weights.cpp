@@ -110,10 +110,12 @@ std::array<double, 2> relative_variance(const FirstPasses& passes) {
             }
         }
         double total = 0.0;
+        double lit = 0.0;
         windows.for_each(values, [&](int x, int y, std::int64_t window) {
-            if ((x + y) % 2 != color) {
+            if ((x + y) % 2 != color || window == 0) {
                 return;
             }
+            lit += 1.0;
             const auto i = static_cast<std::size_t>(y * width + x);
             const double d =
                 (static_cast<double>(passes.first[i]) - static_cast<double>(passes.second[i])) /
@@ -122,7 +124,7 @@ std::array<double, 2> relative_variance(const FirstPasses& passes) {
             const double unit = std::max(static_cast<double>(window) / (kUnit * count), kFloor);
             total += std::min(0.5 * d * d / (unit * unit), kMaxSquare);
         });
-        out[static_cast<std::size_t>(color)] = total / pixels;
+        out[static_cast<std::size_t>(color)] = lit > 0.0 ? total / lit : 0.0;
     }
     return out;
 }

@@ -75,6 +75,33 @@ TEST(PassWeights, VarianceIsThatOfOneSample) {
     }
 }
 
+// Light so rare that nearly all of the picture is black is hard to find; a black background is not.
+TEST(PassWeights, BlackPixelsTellNothing) {
+    constexpr std::uint32_t kSide = 128;
+    Film rare(frame(kSide));
+    PassWeights of_rare;
+    RareLight light(2e-4, 5);
+    for (int pass = 0; pass < 2; ++pass) {
+        add_pass(rare, of_rare, light);
+    }
+    EXPECT_TRUE(of_rare.hard());
+    FirstPasses small{kSide, kSide, {}, {}};
+    FirstPasses whole{kSide, kSide, {}, {}};
+    RareLight noise(0.3, 6);
+    for (std::uint32_t i = 0; i < kSide * kSide; ++i) {
+        const bool inside = i % kSide < 12 && i / kSide < 12;
+        for (const bool first : {true, false}) {
+            const float value = noise();
+            (first ? whole.first : whole.second).push_back(value);
+            (first ? small.first : small.second).push_back(inside ? value : 0.0f);
+        }
+    }
+    for (std::size_t color = 0; color < 2; ++color) {
+        EXPECT_LT(relative_variance(small)[color], 4.0);
+        EXPECT_NEAR(relative_variance(small)[color] / relative_variance(whole)[color], 0.8, 0.5);
+    }
+}
+
 TEST(PassWeights, ColorsDecideForEachOther) {
     constexpr std::uint32_t kSide = 32;
     FirstPasses passes{kSide, kSide, {}, {}};
