@@ -109,7 +109,20 @@ void write_passes(const std::string& path,
     }
 }
 
-constexpr std::array<const char*, 3> kKinds{"OBJECT", "LIGHT", "WORLD"};  // EffortKind
+py::list effort_rows(const RenderSession& session) {
+    constexpr std::array<const char*, 3> kKinds{"OBJECT", "LIGHT", "WORLD"};  // EffortKind
+    py::list rows;
+    for (const EffortShare& row : session.effort()) {
+        rows.append(
+            py::make_tuple(kKinds[static_cast<std::size_t>(row.kind)], row.name, row.share));
+    }
+    return rows;
+}
+
+py::bytes field_bytes(const RenderSession& session) {
+    const std::vector<std::byte> field = session.field();
+    return py::bytes(reinterpret_cast<const char*>(field.data()), field.size());
+}
 
 // The destructor cancels and joins: other Python threads must be able to run meanwhile.
 struct FreeDelete {
@@ -167,29 +180,17 @@ void bind_session(py::module_& m) {
         .def("progress", &RenderSession::progress, FreeGuard())
         .def("statistics", &RenderSession::statistics, FreeGuard())
         .def("report", &RenderSession::report, FreeGuard())
-        .def(
-            "effort",
-            [](const RenderSession& session) {
-                py::list rows;
-                for (const EffortShare& row : session.effort()) {
-                    rows.append(py::make_tuple(
-                        kKinds[static_cast<std::size_t>(row.kind)], row.name, row.share));
-                }
-                return rows;
-            },
-            FloatGuard(),
-            "(kind, name, share) of what made the picture slow: OBJECT by what the camera sees, "
-            "LIGHT and WORLD by where it is lit from; the largest first. Empty before the end and "
-            "without the pass Effort.")
-        .def(
-            "field",
-            [](const RenderSession& session) {
-                const std::vector<std::byte> field = session.field();
-                return py::bytes(reinterpret_cast<const char*>(field.data()), field.size());
-            },
-            FloatGuard(),
-            "What the guide has learned, for another render; empty before the end and without a "
-            "guide.")
+        .def("effort",
+             &effort_rows,
+             FloatGuard(),
+             "(kind, name, share) of what made the picture slow: OBJECT by what the camera sees, "
+             "LIGHT and WORLD by where it is lit from; the largest first. Empty before the end and "
+             "without the pass Effort.")
+        .def("field",
+             &field_bytes,
+             FloatGuard(),
+             "What the guide has learned, for another render; empty before the end and without a "
+             "guide.")
         .def_property_readonly("width", &RenderSession::width)
         .def_property_readonly("height", &RenderSession::height)
         .def("read",
