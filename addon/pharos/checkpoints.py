@@ -37,6 +37,11 @@ def path_for(scene, layer: str, view: str) -> str:
     return str(stem.with_name(".".join(parts) + _SUFFIX))
 
 
+def start_of(checkpoint: str) -> Path:
+    """What the network of that render started from, beside its checkpoint and as long as that."""
+    return Path(checkpoint.removesuffix(_SUFFIX) + ".start" + _SUFFIX)
+
+
 def _remove(scene) -> None:
     stem = _stem(scene, scene.frame_current)
     if not stem.parent.is_dir():

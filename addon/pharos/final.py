@@ -136,12 +136,13 @@ class FinalRender:
 
     def _render(self, description, result, view_name: str) -> None:
         memory = GuideMemory(self._engine, self._scene, self._layer.name, view_name)
+        checkpoint = self._checkpoint(view_name)
         session = self._native.RenderSession(
             description,
             self._threads(),
-            self._checkpoint(view_name),
+            checkpoint,
             60.0 * self._scene.pharos.checkpoint_interval,
-            memory.earlier(),
+            memory.earlier(checkpoint),
         )
         try:
             self._poll(session, result)

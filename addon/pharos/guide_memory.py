@@ -15,6 +15,8 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from . import checkpoints
+
 _SUFFIX = ".pharos_guide"
 _LARGEST = 1 << 30  # bytes that are read
 
@@ -57,11 +59,23 @@ class GuideMemory:
         self._file = _file_for(self._key) if memory == "FILE" else None
         self._keeps = memory != "NONE" and (engine.is_animation or self._file is not None)
 
-    def earlier(self) -> bytes:
-        """What the render starts from; empty: from nothing."""
+    def earlier(self, checkpoint: str) -> bytes:
+        """What the render starts from; empty: from nothing.
+
+        What it starts from lies beside its checkpoint, so that a render that was stopped goes on as
+        it began.
+        """
         if not self._keeps:
             return b""
-        return _learned.get(self._key) or _read(self._file)
+        if checkpoint and Path(checkpoint).is_file():
+            return _read(checkpoints.start_of(checkpoint))
+        field = _learned.get(self._key) or _read(self._file)
+        if checkpoint:
+            start = checkpoints.start_of(checkpoint)
+            start.unlink(missing_ok=True)
+            if field:
+                _write(start, field)
+        return field
 
     def remember(self, session) -> str:
         """Takes what a finished render has learned; says what went wrong, else nothing."""

@@ -91,4 +91,31 @@ def test_file_beside_the_blend():
     assert np.array_equal(_still(scene, 1, "fourth"), first)
 
 
+def test_a_stopped_frame_goes_on_as_it_began():
+    """The second frame of an animation, rendered again by another process that has no memory."""
+    scene = _scene("ANIMATION")
+    scene.pharos.use_checkpoint, scene.pharos.checkpoint_interval = True, 0.05
+    kept = {}
+
+    def keep(_scene, *_):
+        folder = _FOLDER / "stopped"
+        kept.update({path: path.read_bytes() for path in folder.glob("*.pharos_checkpoint")})
+
+    bpy.app.handlers.render_post.append(keep)
+    try:
+        frames = _frames(scene, "stopped")
+    finally:
+        bpy.app.handlers.render_post.remove(keep)
+    assert not list((_FOLDER / "stopped").glob("*.pharos_checkpoint")), "they go with the picture"
+    second = {path: data for path, data in kept.items() if path.name.startswith("0002.")}
+    assert len(second) == 2, sorted(kept)  # the checkpoint, and what it began with
+    for path, data in second.items():
+        path.write_bytes(data)
+    scene.frame_start = scene.frame_end = 2
+    again = _frames(scene, "stopped")[1]
+    assert np.array_equal(again, frames[1])
+    assert harness.report() == [], harness.report()
+    scene.pharos.use_checkpoint = False
+
+
 harness.main(globals())
