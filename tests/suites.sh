@@ -238,10 +238,10 @@ suite_blasan() {
     build_or_fail asan _native || return
     assemble_sanitized || { count 0 1; blame "no sanitized add-on"; return; }
     BLENDER=$folder/blender BLENDER_USER_SCRIPTS=$folder PHAROS_TEST_HOSTS="blender window" \
-        PHAROS_TEST_TIMEOUT=900 UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1 \
+        PHAROS_TEST_TIMEOUT=900 PHAROS_RESTARTS=20 UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1 \
         ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:exitcode=99 \
         counted blasan 2400 /usr/bin/python3 "$PHAROS_ROOT/tests/blender/run_all.py" \
-        test_robustness test_interruptions test_viewport.py
+        test_robustness test_interruptions test_restarts test_viewport.py
 }
 
 # What our suppressions must not hide: succeeds when the race is reported.
