@@ -364,7 +364,7 @@ def security(table: Table) -> None:
         tests_row(table, "security", f"{module}: {what}",
                   [NATIVE / f"{module}_test", f"--gtest_filter={tests}"])
     tests_row(table, "security", "add-on: no code, no pickles, no shell; scripts stay off",
-              [ROOT / "build" / "bpy" / "bin" / "python", "-m", "pytest", "-q",
+              [ROOT / "build" / "bpy" / "bin" / "python", "-m", "pytest",
                ROOT / "tests" / "python" / "test_hygiene.py", "-k", "runs or scripts"])
 
 
