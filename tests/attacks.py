@@ -196,8 +196,8 @@ def soak(table: Table) -> None:
     window_script(table, "soak", "test_interruptions.py")
 
 
-def write_scene(folder: Path, **variables: str) -> Path:
-    path = folder / "scene.pharos"
+def write_scene(folder: Path, name: str = "scene.pharos", **variables: str) -> Path:
+    path = folder / name
     subprocess.run([NATIVE / "session_test", "--gtest_filter=Scripts.TakeADumpFromHere"],
                    env={**os.environ, "PHAROS_WRITE_DUMP": str(path), **variables}, check=True,
                    capture_output=True)
@@ -326,6 +326,7 @@ def exits(table: Table) -> None:
         scene, out = write_scene(Path(name)), Path(name) / "out.exr"
         broken = Path(name) / "broken.pharos"
         broken.write_bytes(scene.read_bytes()[:-100])
+        lost = write_scene(Path(name), "lost.pharos", PHAROS_DUMP_IMAGE="/nowhere/x.png")
         forever = ("--samples", "10000000")
         cases = (
             (0, (scene, "-o", out)),
@@ -333,6 +334,8 @@ def exits(table: Table) -> None:
             (1, ("/nowhere", "-o", out)),
             (2, (scene, "-o", out, "--no-such", "1")),
             (2, (scene, "-o", out, "--samples", "x")),
+            (0, (lost, "-o", out)),
+            (3, (lost, "-o", out, "--strict")),
             (5, (scene, "-o", "/nowhere/x.exr")),
             (130, (scene, "-o", out, *forever)),
             (143, (scene, "-o", out, *forever)),

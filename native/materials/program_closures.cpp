@@ -432,7 +432,7 @@ void run_closures(const Evaluation& e, std::span<const NodeOp> ops, ClosureBatch
             for (const NodeOp& op : ops) {
                 emission += add_closures(e, op, lane, ctx, sink);
             }
-            return emission;
+            return finite_or_black(emission);  // finite ones may add up to what is not
         });
     }
 }
@@ -452,7 +452,7 @@ void run_emission(const Evaluation& e, std::span<const NodeOp> ops, std::span<Rg
             const Rgb weight = principled_v2_emission_weight(inputs, ctx);
             sum += finite_or_black(weight * inputs.emission_color * inputs.emission_strength);
         }
-        values[lane] = sum;
+        values[lane] = finite_or_black(sum);
     }
 }
 
@@ -472,7 +472,7 @@ void run_transparency(const Evaluation& e, std::span<const NodeOp> ops, std::spa
             }
             sum += glm::max(finite_or_black(through), Rgb(0.0f));
         }
-        values[lane] = sum;
+        values[lane] = finite_or_black(sum);
     }
 }
 

@@ -336,6 +336,27 @@ TEST(ProgramCompile, BrokenEmissionIsBlack) {
     EXPECT_EQ(emission_of(compile(b.program), {&hit, 1})[0], Rgb(1, 0, 2));
 }
 
+// Each of them is a number, their sum is none in one channel.
+TEST(ProgramCompile, SumsOfLightThatOverflowAreBlack) {
+    constexpr float kHuge = 3e38f;
+    ProgramBuilder b;
+    for (int i = 0; i < 2; ++i) {
+        const std::int32_t one = b.constant({1, 1, 1});
+        b.add(NodeOpCode::Emission, 0, {one, b.constant({1, kHuge, 2}), b.constant({1})}, 0);
+        b.add(NodeOpCode::Transparent, 0, {one, b.constant({kHuge, 0.25f, 0})}, 0);
+    }
+    const Material material = compile(b.program);
+    const auto hits = random_hits(3);
+    EXPECT_EQ(emission_of(material, hits)[0], Rgb(2, 0, 4));
+    Surfaces surfaces;
+    surfaces.batch.reset(hits.size());
+    surfaces.run(material, hits, all_of(hits.size()));
+    EXPECT_EQ(surfaces.batch.emission[0], Rgb(2, 0, 4));
+    std::vector<Rgb> through(hits.size());
+    evaluate_transparency(material, ShadingContext(), hits, surfaces.scratch, through);
+    EXPECT_EQ(through[0], Rgb(0, 0.5f, 0));
+}
+
 TEST(ProgramCompile, TransparencyIsTheSumOfItsClosures) {
     ProgramBuilder b = diffuse_program();
     b.add(

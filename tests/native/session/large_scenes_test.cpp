@@ -184,7 +184,7 @@ TEST(Memory, EstimateIsNotOverTheTruth) {
 }
 
 // Scripts that need a scene without Blender ask for this one: PHAROS_WRITE_DUMP names the file, and
-// PHAROS_DUMP_RINGS adds a ball of twice its square in triangles.
+// PHAROS_DUMP_RINGS adds a ball of twice its square in triangles, PHAROS_DUMP_IMAGE a texture.
 TEST(Scripts, TakeADumpFromHere) {
     const ScratchFolder folder;
     const char* wanted = std::getenv("PHAROS_WRITE_DUMP");
@@ -195,6 +195,12 @@ TEST(Scripts, TakeADumpFromHere) {
         d.meshes.push_back(sphere_mesh("ball", Vec3(0, -1, 1), 0.2f, count, count));
         d.instances.push_back(d.instances.back());
         d.instances.back().mesh = static_cast<std::uint32_t>(d.meshes.size() - 1);
+    }
+    if (const char* image = std::getenv("PHAROS_DUMP_IMAGE"); image != nullptr) {
+        d.images.emplace_back().path = image;
+        ImageUse use;
+        use.image = 0;
+        d.materials[0].program = image_diffuse_program(use);
     }
     write_dump(d, path);
     EXPECT_EQ(read_dump(path).instances.size(), d.instances.size());
