@@ -131,6 +131,11 @@ def _process_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def _hear_interrupts() -> None:
+    """What a shell starts in the background ignores them."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def interrupt_programs(table: Table, folder: Path, cases: int) -> None:
     """pharos-cli by SIGINT anywhere between its start and its end, the writing of its files too."""
     scene, rng = write_scene(folder), random.Random(11)
@@ -144,7 +149,8 @@ def interrupt_programs(table: Table, folder: Path, cases: int) -> None:
     for _ in range(cases):
         for file in folder.glob("[xk]*"):
             file.unlink()
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                   preexec_fn=_hear_interrupts)
         time.sleep(rng.uniform(0.0, 1.1 * whole))
         asked = time.monotonic()
         before = _children_seconds() + _process_seconds(process.pid)

@@ -140,13 +140,16 @@ def test_cancel_at_random_moments_of_a_render():
     scene.render.filepath = str(harness.TEMPORARY / "cancelled_still.exr")
     bpy.ops.render.render()
     right = _picture()
+    began = time.monotonic()
+    bpy.ops.render.render()
+    whole = time.monotonic() - began  # of two samples, on this machine as busy as it is
     scene.pharos.samples = 1 << 20
     scene.pharos.use_checkpoint = True
     rng = random.Random(3)
     seconds, delivered = [], 0
     for i in range(_RENDERS):
         # A third each: mostly export and build, the first passes, later.
-        seconds.append(_cancelled_after(rng.uniform(0.0, (0.25, 0.8, 2.5)[i % 3])))
+        seconds.append(_cancelled_after(whole * rng.uniform(0.0, (0.5, 1.5, 4.0)[i % 3])))
         pixels = _picture()
         assert np.isfinite(pixels).all()
         delivered += bool(pixels.any())
@@ -156,7 +159,7 @@ def test_cancel_at_random_moments_of_a_render():
     harness.say(f"STRESS cancel of a render in Blender: worst seconds|{len(seconds)}|{worst:.3g}|1")
     harness.say(f"MEASURED render to end: p95 {p95:.3f} s, worst {worst:.3f} s")
     assert worst < 10.0, worst  # on any machine
-    assert delivered >= len(seconds) // 3, (delivered, len(seconds))
+    assert delivered >= len(seconds) // 4, (delivered, len(seconds))
     scene.pharos.samples, scene.pharos.use_checkpoint = 2, False
     bpy.ops.render.render()
     assert np.array_equal(_picture(), right)

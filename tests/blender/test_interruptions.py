@@ -171,6 +171,17 @@ def step_while_it_renders():
 def step_and_enable_it():
     harness.enable_addon()
     bpy.context.scene.render.engine = "PHAROS"
+
+
+def step_shade_it_plainly():
+    """Blender notes in one place for all threads whether Python may write: a render that starts in
+    the midst of a viewport's drawing leaves timers, as this one, without that right for ever.
+    """
+    with window_context():
+        bpy.context.area.spaces[0].shading.type = "SOLID"
+
+
+def step_render_after_that():
     start(4)
 
 
