@@ -81,13 +81,19 @@ struct Depth {
     return {};
 }
 
-[[nodiscard]] bool is_cancelled(void* flag, float /*done*/) {
-    return flag != nullptr && static_cast<const CancelFlag*>(flag)->cancelled();
-}
-
 [[nodiscard]] std::string reader_error(OIIO::ImageInput& input) {
     const std::string text = input.geterror();
     return "The image cannot be read" + (text.empty() ? std::string() : ": " + text);
+}
+
+// Rows read at a time: few enough to be soon through, whole blocks of what compresses by blocks.
+[[nodiscard]] int rows_at_once(const OIIO::ImageSpec& spec, std::size_t row_bytes) {
+    constexpr std::size_t kBytesAtOnce = std::size_t{2} << 20;
+    constexpr std::size_t kBlock = 64;
+    const std::size_t rows = std::max<std::size_t>(1, kBytesAtOnce / row_bytes);
+    const std::size_t tile = spec.tile_height > 0 ? static_cast<std::size_t>(spec.tile_height) : 1;
+    const std::size_t step = (kBlock + tile - 1) / tile * tile;
+    return static_cast<int>((rows + step - 1) / step * step);
 }
 
 // Reads all pixels of an opened file, turned so that the bottom row comes first.
@@ -105,21 +111,40 @@ struct Depth {
     pixels.data.reserve(row * pixels.height + detail::kTexelPadding);  // Texture will not copy them
     pixels.data.resize(row * pixels.height);
     std::uint8_t* top = pixels.data.data() + row * (pixels.height - 1);
-    const bool read = input.read_image(0,
-                                       0,
-                                       0,
-                                       static_cast<int>(pixels.channels),
-                                       depth.theirs,
-                                       top,
-                                       static_cast<OIIO::stride_t>(texel),
-                                       -static_cast<OIIO::stride_t>(row),
-                                       OIIO::AutoStride,
-                                       is_cancelled,
-                                       const_cast<CancelFlag*>(cancel));
-    if (cancel != nullptr && cancel->cancelled()) {
-        throw Cancelled();
+    const auto x_stride = static_cast<OIIO::stride_t>(texel);
+    const auto y_stride = -static_cast<OIIO::stride_t>(row);
+    const auto channels = static_cast<int>(pixels.channels);
+    const int step = rows_at_once(spec, row);
+    for (int y = 0; y < spec.height; y += step) {
+        if (cancel != nullptr) {
+            throw_if_cancelled(*cancel);
+        }
+        const int begin = spec.y + y;
+        const int end = spec.y + std::min(y + step, spec.height);
+        std::uint8_t* to = top - row * static_cast<std::size_t>(y);
+        const bool read =
+            spec.tile_width > 0
+                ? input.read_tiles(0,
+                                   0,
+                                   spec.x,
+                                   spec.x + spec.width,
+                                   begin,
+                                   end,
+                                   spec.z,
+                                   spec.z + 1,
+                                   0,
+                                   channels,
+                                   depth.theirs,
+                                   to,
+                                   x_stride,
+                                   y_stride)
+                : input.read_scanlines(
+                      0, 0, begin, end, spec.z, 0, channels, depth.theirs, to, x_stride, y_stride);
+        if (!read) {
+            return reader_error(input);
+        }
     }
-    return read ? std::string() : reader_error(input);
+    return {};
 }
 
 [[nodiscard]] DecodedImage decode(const char* format,

@@ -3,6 +3,7 @@
 #include <new>
 
 #include "image/image_io.h"
+#include "image/texel_read.h"
 
 namespace pharos {
 
@@ -44,8 +45,10 @@ namespace {
         return image;
     }
     image.pixels.type = TexelType::Float;
-    image.pixels.data.resize(description.pixels.size() * sizeof(float));
-    std::memcpy(image.pixels.data.data(), description.pixels.data(), image.pixels.data.size());
+    const std::size_t bytes = description.pixels.size() * sizeof(float);
+    image.pixels.data.reserve(bytes + detail::kTexelPadding);  // Texture will not copy them
+    image.pixels.data.resize(bytes);
+    std::memcpy(image.pixels.data.data(), description.pixels.data(), bytes);
     return image;
 }
 
@@ -72,7 +75,7 @@ Texture load_texture(const ImageDescription& description,
             alpha = image.straight_alpha ? ImageAlpha::Straight : ImageAlpha::Premultiplied;
         }
         try {
-            return Texture(std::move(image.pixels), description.color_space, alpha);
+            return Texture(std::move(image.pixels), description.color_space, alpha, cancel);
         } catch (const std::bad_alloc&) {
             image.error = "There is not enough memory for the image";
         }

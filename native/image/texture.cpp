@@ -28,6 +28,13 @@ const SrgbTable& srgb_table() {
 namespace {
 
 constexpr float kLargestHalf = 65504.0f;
+constexpr std::size_t kCancelPollInterval = 1u << 18;  // texels
+
+void poll(const CancelFlag* cancel) {
+    if (cancel != nullptr) {
+        throw_if_cancelled(*cancel);
+    }
+}
 
 [[nodiscard]] std::uint16_t to_half(float v) {
     return static_cast<std::uint16_t>(
@@ -100,7 +107,7 @@ struct Conversion {
 
 // Reads texels of depth From and writes them as depth To over the same memory.
 template <TexelType From, TexelType To>
-void convert_texels(TexturePixels& pixels, const Conversion& conversion) {
+void convert_texels(TexturePixels& pixels, const Conversion& conversion, const CancelFlag* cancel) {
     using Source = typename Channel<From>::Stored;
     using Target = typename Channel<To>::Stored;
     static_assert(sizeof(Source) == sizeof(Target));
@@ -109,6 +116,9 @@ void convert_texels(TexturePixels& pixels, const Conversion& conversion) {
     const std::size_t count = std::size_t{pixels.width} * pixels.height;
     std::uint8_t* bytes = pixels.data.data();
     for (std::size_t i = 0; i < count; ++i, bytes += channels * sizeof(Source)) {
+        if (i % kCancelPollInterval == 0) {
+            poll(cancel);
+        }
         std::array<Source, 4> in{};
         std::memcpy(in.data(), bytes, channels * sizeof(Source));
         float alpha = 1.0f;
@@ -138,23 +148,23 @@ void convert_texels(TexturePixels& pixels, const Conversion& conversion) {
     }
 }
 
-void convert(TexturePixels& pixels, const Conversion& conversion) {
+void convert(TexturePixels& pixels, const Conversion& conversion, const CancelFlag* cancel) {
     switch (pixels.type) {
         case TexelType::U8:
-            return convert_texels<TexelType::U8, TexelType::U8>(pixels, conversion);
+            return convert_texels<TexelType::U8, TexelType::U8>(pixels, conversion, cancel);
         case TexelType::Half:
-            return convert_texels<TexelType::Half, TexelType::Half>(pixels, conversion);
+            return convert_texels<TexelType::Half, TexelType::Half>(pixels, conversion, cancel);
         case TexelType::Float:
-            return convert_texels<TexelType::Float, TexelType::Float>(pixels, conversion);
+            return convert_texels<TexelType::Float, TexelType::Float>(pixels, conversion, cancel);
         case TexelType::U16:
             break;
     }
     // Linear values of 16-bit sRGB need finer steps near black than integers have: half floats.
     if (conversion.to_linear) {
-        convert_texels<TexelType::U16, TexelType::Half>(pixels, conversion);
+        convert_texels<TexelType::U16, TexelType::Half>(pixels, conversion, cancel);
         pixels.type = TexelType::Half;
     } else {
-        convert_texels<TexelType::U16, TexelType::U16>(pixels, conversion);
+        convert_texels<TexelType::U16, TexelType::U16>(pixels, conversion, cancel);
     }
 }
 
@@ -175,7 +185,10 @@ void zero_non_finite(TexturePixels& pixels) {
 
 }  // namespace
 
-Texture::Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha alpha)
+Texture::Texture(TexturePixels pixels,
+                 ImageColorSpace color_space,
+                 ImageAlpha alpha,
+                 const CancelFlag* cancel)
     : pixels_(std::move(pixels)) {
     const std::size_t expected =
         std::size_t{pixels_.width} * pixels_.height * pixels_.channels * texel_bytes(pixels_.type);
@@ -185,6 +198,7 @@ Texture::Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha a
                                     std::to_string(pixels_.height) + " texels of " +
                                     std::to_string(pixels_.channels) + " channels");
     }
+    poll(cancel);
     zero_non_finite(pixels_);
 
     Conversion conversion;
@@ -199,8 +213,9 @@ Texture::Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha a
     conversion.unmultiply =
         associated_ && alpha == ImageAlpha::Premultiplied && pixels_.type == TexelType::U16;
     if (conversion.changes_texels()) {
-        convert(pixels_, conversion);
+        convert(pixels_, conversion, cancel);
     }
+    poll(cancel);
     srgb_encoded_ = color_space == ImageColorSpace::Srgb && pixels_.type == TexelType::U8;
     pixels_.data.resize(expected + detail::kTexelPadding);
     mean_ = compute_mean();

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "core/math.h"
 #include "image/image_description.h"
 #include "image/image_sampling.h"
@@ -45,8 +46,11 @@ class Texture {
     Texture() = default;
 
     // Takes the pixels over and converts them in place where their depth asks for it. Throws
-    // std::invalid_argument when the size of `data` does not fit.
-    Texture(TexturePixels pixels, ImageColorSpace color_space, ImageAlpha alpha);
+    // std::invalid_argument when the size of `data` does not fit, Cancelled when it is.
+    Texture(TexturePixels pixels,
+            ImageColorSpace color_space,
+            ImageAlpha alpha,
+            const CancelFlag* cancel = nullptr);
 
     [[nodiscard]] Vec4 lookup(const Vec2& uv,
                               ImageInterpolation interpolation,

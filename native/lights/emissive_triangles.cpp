@@ -67,6 +67,9 @@ EmissiveTriangles::EmissiveTriangles(const LightSamplerInput& input, const Cance
     }
     instance_first_.assign(input.instances.size(), kNone);
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
         const Triangle& t = triangles_[i];
         std::uint32_t& first = instance_first_[t.instance];
         if (first == kNone) {
@@ -180,6 +183,7 @@ void EmissiveTriangles::split_groups(const LightSamplerInput& input, const Cance
         }
     }
     for (std::uint32_t index = 0; index < groups_.size(); ++index) {
+        throw_if_cancelled(cancel);
         for (std::uint32_t i = 0; i < groups_[index].count; ++i) {
             triangles_[groups_[index].first + i].group = index;
         }

@@ -17,6 +17,12 @@ Rgb usable(const Rgb& radiance) {
     return out;
 }
 
+void poll(const CancelFlag* cancel) {
+    if (cancel != nullptr) {
+        throw_if_cancelled(*cancel);
+    }
+}
+
 float magnitude(const Rgb& radiance) {
     const Rgb c = glm::abs(usable(radiance));
     return (c.x + c.y + c.z) * (1.0f / 3.0f);
@@ -33,20 +39,23 @@ double row_measure(std::uint32_t y, std::uint32_t height) {
 // spreads over its neighbours would hardly be sampled.
 std::vector<float> footprint_means(std::span<const Rgb> radiance,
                                    std::uint32_t width,
-                                   std::uint32_t height) {
+                                   std::uint32_t height,
+                                   const CancelFlag* cancel) {
     std::vector<float> value(radiance.size());
-    for (std::size_t i = 0; i < radiance.size(); ++i) {
-        value[i] = magnitude(radiance[i]);
-    }
     std::vector<float> along_x(value.size());
     for (std::size_t y = 0; y < height; ++y) {
-        const float* row = value.data() + y * width;
+        poll(cancel);
+        float* row = value.data() + y * width;
+        for (std::size_t x = 0; x < width; ++x) {
+            row[x] = magnitude(radiance[y * width + x]);
+        }
         for (std::size_t x = 0; x < width; ++x) {
             const float sides = row[x == 0 ? width - 1 : x - 1] + row[x + 1 == width ? 0 : x + 1];
             along_x[y * width + x] = 0.75f * row[x] + 0.125f * sides;
         }
     }
     for (std::size_t y = 0; y < height; ++y) {
+        poll(cancel);
         const float* row = along_x.data() + y * width;
         const float* below = y == 0 ? row : row - width;
         const float* above = y + 1 == height ? row : row + width;
@@ -61,7 +70,8 @@ std::vector<float> footprint_means(std::span<const Rgb> radiance,
 
 EnvironmentLight::EnvironmentLight(std::span<const Rgb> radiance,
                                    std::uint32_t width,
-                                   std::uint32_t height) {
+                                   std::uint32_t height,
+                                   const CancelFlag* cancel) {
     if (width == 0 || height == 0 || radiance.size() != std::size_t{width} * height) {
         throw std::invalid_argument("EnvironmentLight: radiance does not match width x height");
     }
@@ -70,9 +80,10 @@ EnvironmentLight::EnvironmentLight(std::span<const Rgb> radiance,
         mean_ = usable(radiance[0]);
         return;
     }
-    std::vector<float> weights = footprint_means(radiance, width, height);
+    std::vector<float> weights = footprint_means(radiance, width, height, cancel);
     double mean[3] = {0.0, 0.0, 0.0};
     for (std::uint32_t y = 0; y < height; ++y) {
+        poll(cancel);
         const double measure = row_measure(y, height);
         for (std::uint32_t x = 0; x < width; ++x) {
             const std::size_t i = std::size_t{y} * width + x;
@@ -86,7 +97,9 @@ EnvironmentLight::EnvironmentLight(std::span<const Rgb> radiance,
     for (int c = 0; c < 3; ++c) {
         mean_[c] = static_cast<float>(mean[c] / (2.0 * width));
     }
+    poll(cancel);
     map_ = Distribution2D(weights, width, height);
+    poll(cancel);
     // Cosines of the rows' edges and the inverse solid angle of a texel.
     row_cosine_.resize(std::size_t{height} + 1);
     row_density_.resize(height);

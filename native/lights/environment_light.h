@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cancel.h"
 #include "core/math.h"
 #include "sampling/distribution_2d.h"
 
@@ -18,8 +19,11 @@ namespace pharos {
 class EnvironmentLight {
   public:
     // importance: width * height radiance values of the texel centres, bottom row first. A map of
-    // 1 x 1 is a constant world (uniform sphere sampling).
-    EnvironmentLight(std::span<const Rgb> radiance, std::uint32_t width, std::uint32_t height);
+    // 1 x 1 is a constant world (uniform sphere sampling). Throws Cancelled when it is.
+    EnvironmentLight(std::span<const Rgb> radiance,
+                     std::uint32_t width,
+                     std::uint32_t height,
+                     const CancelFlag* cancel = nullptr);
 
     struct Sample {
         Vec3 wi;

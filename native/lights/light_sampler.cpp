@@ -133,6 +133,7 @@ LightSampler::LightSampler(const LightSamplerInput& input) : impl_(std::make_uni
     }
     impl_->triangles = EmissiveTriangles(input, cancel);
     for (std::uint32_t group = 0; group < impl_->triangles.group_count(); ++group) {
+        throw_if_cancelled(cancel);
         bounds.push_back(impl_->triangles.bound(group));
     }
     if (is_worth_sampling(input.environment, !impl_->portals.empty())) {

@@ -115,7 +115,8 @@ void prepare_world(Scene& scene,
     }
     // A map that is black at every texel's centre is left to chance hits.
     if (sampled && !std::ranges::all_of(radiance, is_black)) {
-        scene.environment = std::make_unique<EnvironmentLight>(radiance, size.width, size.height);
+        scene.environment =
+            std::make_unique<EnvironmentLight>(radiance, size.width, size.height, &cancel);
     }
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -83,6 +84,36 @@ TEST_F(ImageIo, ExrKeepsFloatsExactly) {
     EXPECT_FALSE(image.straight_alpha);
     EXPECT_EQ(floats_of(image.pixels), rgba);  // bottom row first on both sides
     EXPECT_FALSE(fs::exists(file("a.exr.part")));
+}
+
+// Large enough to be read in several parts, the last of them smaller; in tiles too.
+TEST_F(ImageIo, LargeOnesAreReadInPartsAndWhole) {
+    constexpr std::uint32_t kWidth = 600;
+    constexpr std::uint32_t kHeight = 977;
+    const std::vector<float> rgba = random_values(4 * kWidth * kHeight, 1000.0f);
+    const ExrPass pass{"", "RGBA", rgba};
+    const std::string exr = file("a.exr");
+    ASSERT_EQ(write_exr(exr, kWidth, kHeight, {&pass, 1}), "");
+    EXPECT_EQ(floats_of(read_image_file(exr).pixels), rgba);
+    for (const char* name : {"tiled.exr", "strips.tif", "tiled.tif"}) {
+        SCOPED_TRACE(name);
+        const std::string tiles = name[0] == 't' ? " --tile 48 80" : "";
+        const std::string command =
+            "oiiotool " + exr + tiles + " --compression zip -o " + file(name);
+        ASSERT_EQ(std::system(command.c_str()), 0);
+        const DecodedImage image = read_image_file(file(name));
+        ASSERT_EQ(image.error, "");
+        EXPECT_EQ(floats_of(image.pixels), rgba);
+    }
+    constexpr std::uint32_t kGreyWidth = 4096;
+    std::vector<float> grey(std::size_t{kGreyWidth} * kHeight);
+    std::vector<std::uint8_t> bytes(grey.size());
+    for (std::size_t i = 0; i < grey.size(); ++i) {
+        bytes[i] = static_cast<std::uint8_t>(i * 7 + i / kGreyWidth);
+        grey[i] = srgb_to_linear(static_cast<float>(bytes[i]) / 255.0f);
+    }
+    ASSERT_EQ(write_png(file("grey.png"), kGreyWidth, kHeight, grey), "");
+    EXPECT_EQ(read_image_file(file("grey.png")).pixels.data, bytes);
 }
 
 TEST_F(ImageIo, ExrHoldsNamedPassesAndMetadata) {
