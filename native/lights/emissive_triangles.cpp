@@ -121,14 +121,22 @@ void EmissiveTriangles::collect(const LightSamplerInput& input, const CancelFlag
         ++groups_[t.group].count;
         triangles_.push_back(t);
     }
-    std::stable_sort(triangles_.begin(),
-                     triangles_.end(),
-                     [](const Triangle& a, const Triangle& b) { return a.group < b.group; });
     std::uint32_t first = 0;
+    std::vector<std::uint32_t> next;
     for (Group& group : groups_) {
         group.first = first;
+        next.push_back(first);
         first += group.count;
     }
+    // By counting: to sort millions in one go takes longer than a cancel may.
+    std::vector<Triangle> sorted(triangles_.size());
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+        if (i % kCancelPollInterval == 0) {
+            throw_if_cancelled(cancel);
+        }
+        sorted[next[triangles_[i].group]++] = triangles_[i];
+    }
+    triangles_ = std::move(sorted);
 }
 
 void EmissiveTriangles::finish_group(Group& group) {
