@@ -57,8 +57,20 @@ class PharosEffortRow(bpy.types.PropertyGroup):
     )
 
 
+def _setting_changed(settings, _context) -> None:
+    """Viewports follow a script as they follow the panel, which Blender tells them by itself."""
+    settings.id_data.update_tag()
+
+
 def _bounces(name: str, description: str, default: int = 12):
-    return IntProperty(name=name, description=description, default=default, min=0, max=1024)
+    return IntProperty(
+        name=name,
+        description=description,
+        default=default,
+        min=0,
+        max=1024,
+        update=_setting_changed,
+    )
 
 
 def _samples(name: str, description: str, default: int, least: int):
@@ -69,6 +81,7 @@ def _samples(name: str, description: str, default: int, least: int):
         min=least,
         max=1 << 24,
         soft_max=65536,
+        update=_setting_changed,
     )
 
 
@@ -76,8 +89,9 @@ def _pass_switch(name: str, description: str):
     return BoolProperty(name=name, description=description, default=False)
 
 
-def _guiding_changed(settings, _context) -> None:
+def _guiding_changed(settings, context) -> None:
     """The switch remembers how it was on."""
+    _setting_changed(settings, context)
     if settings.guiding not in {"OFF", settings.guiding_mode}:
         settings.guiding_mode = settings.guiding
 
@@ -103,6 +117,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         description="Show the viewport's picture without its noise, by the library that comes with "
         "Blender. The samples stay as they are",
         default=False,
+        update=_setting_changed,
     )
     seed: IntProperty(
         name="Seed",
@@ -110,6 +125,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         default=0,
         min=0,
         max=_MAX_SEED,
+        update=_setting_changed,
     )
     time_limit: FloatProperty(
         name="Time Limit",
@@ -125,6 +141,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         description="Send a ray to a light from every surface point. Without it, light is only "
         "found by chance",
         default=True,
+        update=_setting_changed,
     )
     guiding: EnumProperty(
         name="Path Guiding",
@@ -174,11 +191,13 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         name="Reflective Caustics",
         description="Glossy reflections after diffuse ones",
         default=True,
+        update=_setting_changed,
     )
     caustics_refractive: BoolProperty(
         name="Refractive Caustics",
         description="Glossy transmission after diffuse reflections",
         default=True,
+        update=_setting_changed,
     )
     pixel_filter: EnumProperty(
         name="Pixel Filter",
@@ -189,6 +208,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
             ("BOX", "Box", "The pixel's own square"),
         ),
         default="BLACKMAN_HARRIS",
+        update=_setting_changed,
     )
     filter_width: FloatProperty(
         name="Width",
@@ -197,6 +217,7 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         min=0.01,
         max=10.0,
         subtype="PIXEL",
+        update=_setting_changed,
     )
     exposure: FloatProperty(
         name="Exposure",
@@ -204,11 +225,13 @@ class PharosSceneSettings(bpy.types.PropertyGroup):
         default=1.0,
         min=0.0,
         soft_max=10.0,
+        update=_setting_changed,
     )
     follow_cycles: BoolProperty(
         name="Follow Cycles",
         description="Take samples, seed, bounces and film from the scene's Cycles settings",
         default=False,
+        update=_setting_changed,
     )
     use_checkpoint: BoolProperty(
         name="Checkpoints",

@@ -7,6 +7,7 @@ pictures and asks for a redraw.
 
 from __future__ import annotations
 
+import contextlib
 import time
 import weakref
 
@@ -40,6 +41,7 @@ class Viewport:
         self._session = native.LiveSession(threads)
         self._library = Library()
         self._epoch = handlers.edit_epoch()
+        self._engine = lambda: None  # of the last redraw, while it lives
         self._area = None  # pointer of the area that shows it
         self._has_scene = False
         self._sent_full = True  # the last scene came with all its content
@@ -137,6 +139,7 @@ class Viewport:
         if self._session is None:
             return
         self._draw_began = time.monotonic()
+        self._engine = weakref.ref(engine)
         self._area = context.area.as_pointer()
         lost = self._session.progress().lost_scene and not self._sent_full
         if lost or not self._has_scene:
@@ -230,6 +233,14 @@ class Viewport:
         bpy.app.timers.register(look, first_interval=_SHORTEST_INTERVAL)
 
     def redraw(self) -> None:
+        """Asks for a redraw with a new picture; through the engine, where it has drawn before: the
+        host then keeps its depths, for which it would draw all triangles.
+        """
+        engine = self._engine()
+        if engine is not None:
+            with contextlib.suppress(ReferenceError):  # freed by the host: nothing to draw for
+                engine.tag_redraw()
+            return
         for window in bpy.context.window_manager.windows:
             for area in window.screen.areas:
                 if area.type == "VIEW_3D" and self._area in (None, area.as_pointer()):

@@ -156,6 +156,18 @@ def step_border_shows_a_part():
     area().spaces[0].use_render_border = False
 
 
+def step_settings_by_script():
+    """Nothing but a setting changes, and nobody asks for a redraw."""
+    bpy.context.scene.pharos.exposure = 0.5
+    bpy.context.scene.pharos.preview_samples = 3
+
+
+def step_settings_are_followed():
+    assert viewport().session.progress().render.total_samples == 3
+    expect(screenshot(), (0.9, 0.9), (0.1, 0.25, 0.05))
+    bpy.context.scene.pharos.exposure = 1.0
+
+
 def step_learn_lobes():
     scene = bpy.context.scene
     scene.pharos.guiding = "NEURAL"
