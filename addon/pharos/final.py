@@ -227,7 +227,11 @@ def guide_words(guide) -> str:
         return ""
     why = guide.why_unguided
     doing = f"Guiding {why}" if why else f"Guiding {100 * guide.guided_share:.0f} % of vertices"
-    return f"{doing}, loss {guide.held_out_loss:.3f}" if guide.snapshots else doing
+    if guide.snapshots:
+        doing = f"{doing}, loss {guide.held_out_loss:.3f}"
+    if not why and guide.fitting < 1.0:
+        doing = f"{doing}, {100 * guide.fitting:.0f} % of its work fits into a frame"
+    return doing
 
 
 def stats_line(progress) -> str:

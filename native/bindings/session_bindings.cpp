@@ -47,6 +47,7 @@ void bind_guide_status(py::module_& m) {
         .def_readonly("snapshots", &GuideStatus::snapshots)
         .def_readonly("records", &GuideStatus::records)
         .def_readonly("skipped_steps", &GuideStatus::skipped_steps)
+        .def_readonly("fitting", &GuideStatus::fitting)
         .def_property_readonly("state", &guide_state)
         .def_property_readonly("why_unguided",
                                [](const GuideStatus& s) { return why_unguided(guide_state(s)); });

@@ -57,6 +57,8 @@ constexpr const char* kUsage =
     "  fits into 16 ms a frame\n"
     "  --seconds N,N,...  CPU seconds over threads (default: 1,2,4,8)\n"
     "  --turns N          of each (default: 2)\n"
+    "  --budget MS        of the guide in a frame (default: 16)\n"
+    "  --frame MS         what a frame is where a sample takes longer (default: 33.3)\n"
     "  --reference, --size, --seed, --threads, --nee as above\n"
     "       pharos-cli animate FILE --move X,Y,Z [options]\n"
     "  error x CPU time of the frames of an animation in which a lamp moves: the guide goes on "

@@ -16,7 +16,7 @@ namespace pharos::cli {
 
 namespace {
 
-constexpr double kBudget = 0.016;  // seconds of a frame for guided vertices and training
+constexpr double kBudget = FrameBudget{}.guide;
 
 struct Options : CommonOptions {
     SettlingSettings settling;
@@ -35,6 +35,10 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         s.turns = std::max(parse_number<std::uint32_t>(name, value), 1u);
     } else if (name == "--reference") {
         s.reference = std::max(parse_number<std::uint32_t>(name, value), 1u);
+    } else if (name == "--frame") {
+        s.budget.frame = 1e-3 * parse_number<double>(name, value);
+    } else if (name == "--budget") {
+        s.budget.guide = 1e-3 * parse_number<double>(name, value);
     } else if (name == "--size") {
         options.size = parse_list(name, value);
     } else {

@@ -37,8 +37,9 @@ void GuidingField::evaluate(const FieldQuery& query, std::span<VmfMixture> mixtu
 
 TrainStatistics GuidingField::train(std::span<const RadianceRecord> records,
                                     ThreadPool& pool,
-                                    const CancelFlag* cancel) {
-    return impl_->trainer.train(impl_->state, records, pool, cancel);
+                                    const CancelFlag* cancel,
+                                    std::size_t visits) {
+    return impl_->trainer.train(impl_->state, records, pool, {cancel, visits});
 }
 
 void GuidingField::restart_optimizer() {

@@ -46,6 +46,10 @@ struct FieldQuery {
     std::span<const float> nx, ny, nz;
 };
 
+// Visits wanted in a pass, and the most of one record to reach them.
+inline constexpr std::size_t kTrainingVisits = 32768;
+inline constexpr std::size_t kMaxVisitsOfRecord = 4;
+
 struct TrainStatistics {
     std::uint64_t records = 0;          // given
     std::uint64_t invalid_records = 0;  // non-finite or negative values, pdf not positive: dropped
@@ -71,10 +75,12 @@ class GuidingField {
     void evaluate(const FieldQuery& query, std::span<VmfMixture> mixtures) const;
 
     // One pass of training on all threads of the pool. Bit-equal results for any pool size. Where
-    // `cancel` is set meanwhile it ends early and publishes nothing.
+    // `cancel` is set meanwhile it ends early and publishes nothing. Few records are visited up to
+    // four times, but not more than `visits` in all.
     TrainStatistics train(std::span<const RadianceRecord> records,
                           ThreadPool& pool,
-                          const CancelFlag* cancel = nullptr);
+                          const CancelFlag* cancel = nullptr,
+                          std::size_t visits = kTrainingVisits);
 
     // After an edit of the scene: weights stay, the learning rate, moments and averages start
     // again.

@@ -12,13 +12,6 @@
 
 namespace pharos {
 
-namespace {
-
-constexpr std::size_t kRecordsPerPass = 32768;  // visits wanted
-constexpr std::size_t kMaxEpochs = 4;
-
-}  // namespace
-
 // The pool's threads for the length of one train() call: the caller leads and hands out short
 // tasks, the others poll for them. A helper that the system has paused holds up nobody, since tasks
 // are claimed one by one and the leader takes part.
@@ -109,9 +102,9 @@ NetworkView Trainer::view(const NetworkState& state, const AlignedFloats& parame
 TrainStatistics Trainer::train(NetworkState& state,
                                std::span<const RadianceRecord> records,
                                ThreadPool& pool,
-                               const CancelFlag* cancel) {
+                               const TrainLimits& limits) {
     TrainStatistics statistics;
-    cancel_ = cancel;
+    limits_ = limits;
     statistics.records = records.size();
     // Weights that something overwrote: back to the snapshot, or from the start.
     if (!all_finite(state.parameters) || !all_finite(state.average) ||
@@ -148,7 +141,8 @@ void Trainer::train_batches(NetworkState& state, Team& team, TrainStatistics& st
     // Few records (most had no light and were thinned) are visited several times: at the start it
     // is the number of steps that learning waits for.
     const std::size_t size = std::max<std::size_t>(1, records_.training.size());
-    const std::size_t epochs = std::clamp<std::size_t>(kRecordsPerPass / size, 1, kMaxEpochs);
+    const std::size_t epochs =
+        std::clamp<std::size_t>(limits_.visits / size, 1, kMaxVisitsOfRecord);
     const std::size_t end = epochs * chunks;
     for (std::size_t visit = 0; visit < end && !cancelled();) {
         const std::size_t first = visit % chunks;

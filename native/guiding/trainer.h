@@ -12,6 +12,11 @@
 
 namespace pharos {
 
+struct TrainLimits {
+    const CancelFlag* cancel = nullptr;
+    std::size_t visits = kTrainingVisits;
+};
+
 class Trainer {
   public:
     explicit Trainer(const NetworkLayout& layout);
@@ -19,12 +24,14 @@ class Trainer {
     TrainStatistics train(NetworkState& state,
                           std::span<const RadianceRecord> records,
                           ThreadPool& pool,
-                          const CancelFlag* cancel = nullptr);
+                          const TrainLimits& limits = {});
 
   private:
     class Team;
 
-    [[nodiscard]] bool cancelled() const { return cancel_ != nullptr && cancel_->cancelled(); }
+    [[nodiscard]] bool cancelled() const {
+        return limits_.cancel != nullptr && limits_.cancel->cancelled();
+    }
 
     void train_batches(NetworkState& state, Team& team, TrainStatistics& statistics);
     bool train_batch(NetworkState& state, Team& team, std::size_t first_chunk, double& loss);
@@ -35,7 +42,7 @@ class Trainer {
                                    const AlignedFloats& parameters) const;
 
     const NetworkLayout* layout_;
-    const CancelFlag* cancel_ = nullptr;  // of the call under way
+    TrainLimits limits_;  // of the call under way
     PreparedRecords records_;
     std::vector<AlignedFloats> workspace_;  // one per chunk of a batch
     std::vector<AlignedFloats> gradient_;

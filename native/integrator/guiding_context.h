@@ -10,6 +10,7 @@
 #include "guiding/guiding_field.h"
 #include "guiding/roulette.h"
 #include "guiding/selection.h"
+#include "integrator/guide_limit.h"
 
 namespace pharos {
 
@@ -18,6 +19,7 @@ struct GuidingContext {
     const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
     bool selection_serves = true;               // false: it is off everywhere
     float fixed_share = 0.0f;                   // the least share, where there is a selection
+    GuideLimit limit;    // vertices that are asked about anyway are served whatever it says
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;
     float record_probability = 0.0f;  // of a camera sample
@@ -42,6 +44,7 @@ struct RecordBuffer {
     std::vector<SelectionRecord> selection;
     std::uint64_t recorded_paths = 0;
     std::uint64_t variance_sum = 0;  // of kVarianceUnit: whole numbers add up alike in any order
+    GuideDemand demand{};            // of one pass: not kept in files
 
     static constexpr double kVarianceUnit = 1.0 / (1 << 20);
 
@@ -50,6 +53,7 @@ struct RecordBuffer {
         selection.clear();
         recorded_paths = 0;
         variance_sum = 0;
+        demand = {};
     }
 
     void append(const RecordBuffer& other) {
@@ -57,6 +61,9 @@ struct RecordBuffer {
         selection.insert(selection.end(), other.selection.begin(), other.selection.end());
         recorded_paths += other.recorded_paths;
         variance_sum += other.variance_sum;
+        for (std::uint32_t rank = 0; rank < kGuideRanks; ++rank) {
+            demand[rank] += other.demand[rank];
+        }
     }
 };
 

@@ -16,6 +16,7 @@ struct VertexRecord {
     SelectionRecord selection;
     std::uint32_t path = 0;
     std::uint32_t vertex = 0;
+    std::uint32_t rank = 0;  // guide_rank()
     bool complete = false;   // a smooth direction was sampled
     bool judged = false;     // the field was asked, so that selection can compare
     float nee_scale = 0.0f;  // pdf / mis_weight of the light sample

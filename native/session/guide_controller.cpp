@@ -86,13 +86,13 @@ GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std
       pixels_(pixels),
       record_probability_(pixels < 65536 ? 1.0f : kFirstRecordProbability) {
     status_.enabled = enabled_;
-    if (!enabled_) {
-        return;
+    if (enabled_) {
+        field_.emplace(guiding_config(mode), scene_box);
+        if (mode == GuidingMode::Neural) {
+            selection_.emplace(scene_box);
+        }
     }
-    field_.emplace(guiding_config(mode), scene_box);
-    if (mode == GuidingMode::Neural) {
-        selection_.emplace(scene_box);
-    }
+    plan_next();
 }
 
 void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited) {
@@ -105,6 +105,7 @@ void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixe
     weights_ = PassWeights();
     continued_ = field_->generation() > 0;
     if (!edited && pass_ > 1) {
+        plan_next();
         return;
     }
     field_->restart_optimizer();
@@ -116,6 +117,36 @@ void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixe
     adjoint_scale_ = {};
     status_.closed = false;
     status_.guided_share = 0.0;
+    plan_next();
+}
+
+void GuideController::set_budget(const GuideBudget& budget) {
+    budget_ = budget;
+    plan_next();
+}
+
+// What every path of a pass asked for, by those that were recorded.
+void GuideController::count_rates(const RecordBuffer& records, const SelectionPass& work) {
+    if (records.recorded_paths == 0 || work.paths <= 0.0) {
+        return;
+    }
+    rates_.vertices = work.vertices / work.paths;
+    for (std::uint32_t rank = 0; rank < kGuideRanks; ++rank) {
+        rates_.demand[rank] =
+            static_cast<double>(records.demand[rank]) / static_cast<double>(records.recorded_paths);
+    }
+}
+
+void GuideController::plan_next() {
+    GuideWish wish;
+    wish.pixels = pixels_;
+    wish.record_probability = record_probability_;
+    if (field_ && field_->generation() > 0) {
+        wish.guides_unproven = !selection_ || hard_share_ > 0.0f;
+        wish.guides_proven = wish.guides_unproven || status_.guided_share > 0.0;
+    }
+    plan_ = plan_guide(budget_, rates_, wish);
+    status_.fitting = plan_.fitting;
 }
 
 std::array<double, 2> GuideController::weight(std::uint32_t first_sample) const {
@@ -149,7 +180,8 @@ GuidingContext GuideController::next_pass() const {
         return context;
     }
     context.record = !frozen_;
-    context.record_probability = record_probability_;
+    context.record_probability = plan_.record_probability;
+    context.limit = plan_.limit;
     context.pixel_estimate = pixel_estimate_;
     if (field_->generation() == 0) {
         return context;
@@ -183,7 +215,7 @@ void GuideController::learn(RecordBuffer records,
         return;
     }
     const double recorded = static_cast<double>(records.radiance.size());
-    const TrainStatistics trained = field_->train(records.radiance, pool, cancel);
+    const TrainStatistics trained = field_->train(records.radiance, pool, cancel, plan_.visits);
     if (cancel != nullptr && cancel->cancelled()) {
         return;
     }
@@ -219,7 +251,7 @@ void GuideController::learn(RecordBuffer records,
         status_.guided_share = 1.0;
     }
     if (recorded > 0.0) {
-        const double per_probability = recorded / static_cast<double>(record_probability_);
+        const double per_probability = recorded / static_cast<double>(plan_.record_probability);
         record_probability_ = static_cast<float>(std::clamp(wanted / per_probability, 0.005, 1.0));
     }
     if (pass_ < (hard_ ? kEstimateEveryPass : kEasyEstimateEveryPass) || pass_ % 4 == 0 ||
@@ -227,6 +259,8 @@ void GuideController::learn(RecordBuffer records,
         pixel_estimate_ = estimate_pixels(film);
     }
     ++pass_;
+    count_rates(records, work);
+    plan_next();
 }
 
 void GuideController::rest() {
@@ -271,6 +305,7 @@ void GuideController::read_state(StateReader& in) {
     if (selection_) {
         selection_->load(in);
     }
+    plan_next();
 }
 
 void GuideController::load(StateReader& in) {

@@ -15,6 +15,7 @@
 #include "integrator/guiding_context.h"
 #include "integrator/render_context.h"
 #include "scene/scene.h"
+#include "session/guide_budget.h"
 #include "session/guide_status.h"
 #include "session/pass_weights.h"
 
@@ -31,6 +32,9 @@ class GuideController {
     // from its first pass on; in an edited one the field's optimiser starts again, and what was
     // proven has to be proven anew.
     void begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited);
+
+    // For live pictures, before one begins: what a frame may spend. Without it all is spent.
+    void set_budget(const GuideBudget& budget);
 
     [[nodiscard]] bool learning() const { return enabled_ && !frozen_ && !status_.closed; }
 
@@ -88,6 +92,9 @@ class GuideController {
     void calibrate(const std::array<double, 2>& calibration);
     void judge_hardness(const SelectionStatistics& selected);
 
+    void count_rates(const RecordBuffer& records, const SelectionPass& work);
+    void plan_next();
+
     void read_state(StateReader& in);
 
     bool enabled_;
@@ -104,6 +111,9 @@ class GuideController {
     std::optional<GuideSelection> selection_;
     std::vector<float> pixel_estimate_;
     PassWeights weights_;
+    GuideBudget budget_;
+    GuideRates rates_;
+    GuidePlan plan_;
     GuideStatus status_;
 };
 

@@ -13,10 +13,12 @@ GuideController& GuideMemory::begin_picture(const Scene& scene, bool edited) {
     kept_ = fitting && guide_->status().snapshots > 0;
     if (fitting) {
         guide_->begin_picture(scene.bounds, pixels, edited);
-        return *guide_;
+    } else {
+        mode_ = scene.description.settings.guiding;
+        guide_.emplace(mode_, scene.bounds, pixels);
     }
-    mode_ = scene.description.settings.guiding;
-    return guide_.emplace(mode_, scene.bounds, pixels);
+    guide_->set_budget(budget_);
+    return *guide_;
 }
 
 }  // namespace pharos

@@ -15,6 +15,9 @@ class GuideMemory {
     // picture at a time.
     [[nodiscard]] GuideController& begin_picture(const Scene& scene, bool edited);
 
+    // Of all pictures to come.
+    void set_budget(const GuideBudget& budget) { budget_ = budget; }
+
     // The next picture starts with a new guide.
     void forget() { guide_.reset(); }
 
@@ -27,6 +30,7 @@ class GuideMemory {
     [[nodiscard]] bool fits(const Scene& scene) const;
 
     std::optional<GuideController> guide_;
+    GuideBudget budget_;
     GuidingMode mode_ = GuidingMode::Off;
     bool kept_ = false;
 };

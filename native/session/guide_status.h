@@ -16,6 +16,7 @@ struct GuideStatus {
     std::uint64_t snapshots = 0;
     std::uint64_t records = 0;
     std::uint64_t skipped_steps = 0;
+    double fitting = 1.0;  // share of its work that fits into the budget of a frame
 };
 
 template <class Archive>

@@ -15,7 +15,9 @@
 #include "core/memory.h"
 #include "scene/compare.h"
 #include "session/coarse_view.h"
+#include "session/guide_budget.h"
 #include "session/guide_controller.h"
+#include "session/guide_costs.h"
 #include "session/guide_memory.h"
 
 namespace pharos {
@@ -58,9 +60,11 @@ struct Requests {
 }  // namespace
 
 struct LiveSession::Impl {
-    explicit Impl(unsigned thread_count) : threads(thread_count) {}
+    Impl(unsigned thread_count, const FrameBudget& frame_budget)
+        : threads(thread_count), budget(frame_budget) {}
 
     const unsigned threads;
+    const FrameBudget budget;
     CancelFlag closing;
 
     mutable std::mutex mutex;  // guards everything down to `full`
@@ -84,6 +88,7 @@ struct LiveSession::Impl {
     bool waiting = false;  // there is a picture to be rendered
     bool edited = false;   // since the last picture began
     GuideMemory guide;
+    std::optional<GuideBudget> calibrated;
     GuideController no_guide{GuidingMode::Off, Bounds3(), 1};
 
     std::jthread driver;  // last: joins before anything it uses is destroyed
@@ -94,6 +99,7 @@ struct LiveSession::Impl {
     void render();
     void start(GuideController& controller, std::shared_ptr<RenderSession>& place);
     [[nodiscard]] bool finish(RenderSession& session);
+    void calibrate();
     void announce_picture(const RenderSession& session);
     void fail(const std::string& error);
     void answer_lobes(const GuideController& controller);
@@ -210,6 +216,28 @@ std::vector<std::shared_ptr<RenderSession>> LiveSession::Impl::drop_picture() {
     return dropped;
 }
 
+// Once: what the guide costs, and by a coarse picture what vertices cost without it. Views that
+// need none are rendered in no time.
+void LiveSession::Impl::calibrate() {
+    if (!calibrated) {
+        const double workers =
+            threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+        calibrated.emplace();
+        calibrated->guide = workers * budget.guide;
+        calibrated->frame = workers * budget.frame;
+        calibrated->costs = measure_guide_costs(guiding_config(GuidingMode::Neural));
+    }
+    if (coarse && calibrated->vertex == 0.0) {
+        const SessionStatistics work = coarse->statistics();
+        double seconds = 0.0;
+        for (const StageStatistics& stage : work.stages) {
+            seconds += stage.seconds;
+        }
+        calibrated->vertex = seconds / std::max(1.0, static_cast<double>(work.vertices));
+    }
+    guide.set_budget(*calibrated);
+}
+
 // A coarse picture first, where the view is large, then the view itself.
 void LiveSession::Impl::render() {
     auto dropped = drop_picture();
@@ -226,6 +254,9 @@ void LiveSession::Impl::render() {
         }
     }
     dropped.clear();
+    if (scene.scene()->description.settings.guiding != GuidingMode::Off) {
+        calibrate();
+    }
     GuideController& controller = guide.begin_picture(*scene.scene(), edited);
     edited = false;
     {
@@ -276,7 +307,8 @@ void LiveSession::Impl::run() {
     }
 }
 
-LiveSession::LiveSession(unsigned threads) : impl_(std::make_unique<Impl>(threads)) {
+LiveSession::LiveSession(unsigned threads, const FrameBudget& budget)
+    : impl_(std::make_unique<Impl>(threads, budget)) {
     impl_->driver = std::jthread([impl = impl_.get()] { impl->run(); });
 }
 

@@ -27,9 +27,16 @@ struct LiveProgress {
     bool has_picture = false;    // of the newest view and scene there is something to show
 };
 
+// What the guide may take of the time, in seconds with all threads; costs are counted, and
+// calibrated once a session (guide_budget.h).
+struct FrameBudget {
+    double guide = 0.016;       // guided vertices and training, a frame
+    double frame = 1.0 / 30.0;  // redraws come no sooner
+};
+
 class LiveSession {
   public:
-    explicit LiveSession(unsigned threads = 0);
+    explicit LiveSession(unsigned threads = 0, const FrameBudget& budget = {});
     ~LiveSession();
     LiveSession(const LiveSession&) = delete;
     LiveSession& operator=(const LiveSession&) = delete;

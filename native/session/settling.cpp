@@ -63,7 +63,7 @@ void take_turn(SceneDescription description,
     const bool guided = description.settings.guiding != GuidingMode::Off;
     std::vector<double>& errors = guided ? sum.guided : sum.unguided;
     const double threads = ThreadPool(settings.threads).size();
-    LiveSession live(settings.threads);
+    LiveSession live(settings.threads, settings.budget);
     double begin = process_seconds();
     live.set_scene(std::move(description));
     for (std::size_t i = 0; i < settings.seconds.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/scene_description.h"
+#include "session/live_session.h"
 
 namespace pharos {
 
@@ -16,6 +17,7 @@ struct SettlingSettings {
     std::vector<std::uint32_t> seconds{1, 2, 4, 8};
     std::uint32_t turns = 2;        // guided and unguided take turns, so many each
     std::uint32_t reference = 256;  // samples of the reference
+    FrameBudget budget;             // of the guide
     unsigned threads = 0;
 };
 

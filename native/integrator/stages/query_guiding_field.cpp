@@ -13,6 +13,8 @@ constexpr float kMinGuidedAlpha = kMinGuidedRoughness * kMinGuidedRoughness;
 constexpr float kMaxProductRoughness = 0.25f;
 constexpr float kMaxProductAlpha = kMaxProductRoughness * kMaxProductRoughness;
 
+constexpr std::uint32_t kLimitSalt = 0x3c6ef372u;
+
 struct LobeSummary {
     float guidable = 0.0f;  // share of the sample weight that a guide can serve
     float glossy = 0.0f;    // of that, in reflecting microfacet lobes
@@ -73,6 +75,7 @@ std::uint32_t open_record(const RenderContext& context,
     VertexRecord record;
     record.path = path;
     record.vertex = batch.counters[path].depth;
+    record.rank = guide_rank(batch.counters[path].bounce, 0.0f);
     record.selection.position = batch.surfaces[s].p;
     record.selection.normal = batch.surfaces[s].ns;
     record.selection.glossy = glossy;
@@ -94,6 +97,13 @@ void queue_query(std::size_t s, const Closure* lobe, PathBatch& batch) {
         batch.query[static_cast<std::size_t>(axis)].push_back(surface.p[axis]);
         batch.query[static_cast<std::size_t>(axis) + 3].push_back(surface.ns[axis]);
     }
+}
+
+// Of this path's vertex and of nothing else that is drawn for it.
+[[nodiscard]] std::uint32_t limit_bits(std::uint32_t path, const PathBatch& batch) {
+    const std::uint32_t sample =
+        hash_combine(batch.sampler_hash[path] ^ kLimitSalt, batch.sample_index[path]);
+    return hash_combine(sample, batch.counters[path].depth);
 }
 
 void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch) {
@@ -121,12 +131,19 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
         return;
     }
     const SurfaceInteraction& surface = batch.surfaces[s];
-    guide.share = guiding.fixed_share;
-    if (guiding.selection != nullptr) {
-        guide.share =
-            std::max(guide.share, guiding.selection->alpha(surface.p, surface.ns, glossy));
+    const float proven = guiding.selection == nullptr
+                             ? 0.0f
+                             : guiding.selection->alpha(surface.p, surface.ns, glossy);
+    const std::uint32_t rank = guide_rank(batch.counters[path].bounce, proven);
+    const bool asked = recorded && guiding.probe;
+    guide.share = std::max(guiding.fixed_share, proven);
+    if (guiding.limit.active() && !asked && !guiding.limit.admits(rank, limit_bits(path, batch))) {
+        guide.share = 0.0f;
     }
-    if (guide.share > 0.0f || (recorded && guiding.probe)) {
+    if (recorded) {
+        batch.records[batch.vertex_record[s]].rank = rank;
+    }
+    if (guide.share > 0.0f || asked) {
         queue_query(s, lobes.dominant, batch);
     }
 }

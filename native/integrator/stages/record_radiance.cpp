@@ -51,6 +51,7 @@ std::uint64_t record_radiance(const RenderContext& context,
         return 0;
     }
     for (VertexRecord& record : batch.records) {
+        ++buffer.demand[record.rank];
         if (record.complete) {
             finish_record(context, batch, record, buffer);
         }

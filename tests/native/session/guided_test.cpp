@@ -1,6 +1,7 @@
 // Guided renders: the same mean whatever the guide believes, the same bits for any thread count.
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -68,6 +69,41 @@ TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
             EXPECT_NEAR(mean / exact, 1.0, 3e-3) << "nee " << nee << ", roulette " << roulette;
             EXPECT_EQ(integrator.statistics().nonfinite, 0u);
         }
+    }
+}
+
+// Which vertices are guided is decided before their directions are drawn.
+TEST(GuidedStatistics, ALimitedPoisonedGuideKeepsTheClosedForm) {
+    ThreadPool pool(2);
+    SceneDescription description = emitting_box(32, 24);
+    const FilmDescription frame = description.film;
+    const double exact = exact_radiance(description.settings.max_bounces);
+    SceneReport report;
+    const CancelFlag cancel;
+    const auto scene = build_scene(std::move(description), cancel, report);
+    const GuidingField field = poisoned_field(scene->bounds, Vec3(0.6f, 0.0f, 0.8f), pool);
+    std::uint64_t asked = std::numeric_limits<std::uint64_t>::max();
+    for (const std::uint32_t whole : {kGuideRanks, 7u, 3u, 0u}) {
+        GuidingContext guiding;
+        guiding.field = &field;
+        guiding.fixed_share = 0.5f;
+        guiding.limit.whole = whole;
+        guiding.limit.part = 0.4f;
+        guiding.record = guiding.probe = true;
+        guiding.record_probability = 0.1f;
+        Integrator integrator(*scene, pool);
+        SharedFilm film(frame);
+        ASSERT_TRUE(integrator.render_pass({0, 1024}, guiding, film, {cancel, {}}));
+        std::vector<float> pixels(std::size_t{32} * 24 * 4);
+        film.film.read(FilmPass::Combined, pixels);
+        double mean = 0.0;
+        for (std::size_t i = 0; i < pixels.size(); i += 4) {
+            mean += static_cast<double>(pixels[i]) / (32.0 * 24.0);
+        }
+        EXPECT_NEAR(mean / exact, 1.0, 3e-3) << "ranks " << whole;
+        BatchStatistics statistics = integrator.statistics();
+        EXPECT_LT(statistics[Stage::QueryGuidingField].items, asked) << "ranks " << whole;
+        asked = statistics[Stage::QueryGuidingField].items;
     }
 }
 
