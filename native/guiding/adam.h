@@ -10,13 +10,16 @@
 
 namespace pharos {
 
-// `step` counts from 0. rate * (floor + (1 - floor) exp(-step / steps)); the average's decay warms
-// up as step / (step + 10), so that the first step is taken whole.
-[[nodiscard]] inline AdamStep adam_schedule(const GuidingConfig& config, std::uint64_t step) {
+// `step` counts from 0. rate * (floor + (1 - floor) exp(-step / steps)), with other steps where the
+// weights go on after an edit; the average's decay warms up as step / (step + 10), so that the
+// first step is taken whole.
+[[nodiscard]] inline AdamStep adam_schedule(const GuidingConfig& config,
+                                            std::uint64_t step,
+                                            bool goes_on = false) {
     const auto t = static_cast<double>(step);
+    const float steps = goes_on ? config.relearning_rate_steps : config.learning_rate_steps;
     const auto floor = static_cast<double>(config.learning_rate_floor);
-    const double decay =
-        floor + (1.0 - floor) * std::exp(-t / static_cast<double>(config.learning_rate_steps));
+    const double decay = floor + (1.0 - floor) * std::exp(-t / static_cast<double>(steps));
     AdamStep out;
     const double correction1 = 1.0 - std::pow(static_cast<double>(out.beta1), t + 1.0);
     const double correction2 = std::sqrt(1.0 - std::pow(static_cast<double>(out.beta2), t + 1.0));

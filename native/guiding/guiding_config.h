@@ -44,9 +44,10 @@ struct GuidingConfig {
     bool target_cosine = true;   // learn L_i |cos|; false: L_i
     float weight_clip = 100.0f;  // of L_i cos / (p A)
     float learning_rate = 1e-2f;
-    float learning_rate_floor = 0.1f;     // share of the rate that stays
-    float learning_rate_steps = 2400.0f;  // decay: floor + (1 - floor) exp(-step / steps)
-    int batch_size = 512;                 // multiple of 128, 128 ... 16384
+    float learning_rate_floor = 0.1f;      // share of the rate that stays
+    float learning_rate_steps = 2400.0f;   // decay: floor + (1 - floor) exp(-step / steps)
+    float relearning_rate_steps = 250.0f;  // of weights that go on after an edit: nearly right
+    int batch_size = 512;                  // multiple of 128, 128 ... 16384
     float ema_decay = 0.98f;
     float gradient_clip = 1.0f;  // of the global norm
     float zero_keep = 0.25f;     // share of the zero records that is kept (1 / 2^n)

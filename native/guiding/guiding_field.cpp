@@ -44,6 +44,7 @@ TrainStatistics GuidingField::train(std::span<const RadianceRecord> records,
 
 void GuidingField::restart_optimizer() {
     pharos::restart_optimizer(impl_->state);
+    impl_->state.goes_on = impl_->state.generation > 0;
 }
 
 std::uint64_t GuidingField::generation() const {

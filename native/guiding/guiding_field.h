@@ -83,7 +83,7 @@ class GuidingField {
                           std::size_t visits = kTrainingVisits);
 
     // After an edit of the scene: weights stay, the learning rate, moments and averages start
-    // again.
+    // again, and the rate falls sooner, since what it knows is nearly right.
     void restart_optimizer();
 
     // Number of published snapshots; 0 means that the field has learned nothing yet.

@@ -28,6 +28,7 @@ void check_config(const GuidingConfig& c) {
     require(c.learning_rate > 0.0f && c.learning_rate <= 1.0f, "learning_rate");
     require(c.learning_rate_floor >= 0.0f && c.learning_rate_floor <= 1.0f, "learning_rate_floor");
     require(c.learning_rate_steps > 0.0f, "learning_rate_steps");
+    require(c.relearning_rate_steps > 0.0f, "relearning_rate_steps");
     require(c.batch_size >= 128 && c.batch_size <= 16384 && c.batch_size % 128 == 0, "batch_size");
     require(c.ema_decay >= 0.0f && c.ema_decay < 1.0f, "ema_decay");
     require(c.gradient_clip > 0.0f, "gradient_clip");

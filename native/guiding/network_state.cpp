@@ -93,6 +93,7 @@ void restart_optimizer(NetworkState& state) {
 void reset_weights(const NetworkLayout& layout, NetworkState& state) {
     initialize(layout, state.parameters);
     restart_optimizer(state);
+    state.goes_on = false;
 }
 
 NetworkState make_network_state(const NetworkLayout& layout, const Bounds3& scene_box) {

@@ -20,6 +20,7 @@ struct NetworkState {
     AlignedFloats second_moment;
     AlignedFloats published;
     std::uint64_t step = 0;  // of the optimiser; 0 restarts rate, moments and average
+    bool goes_on = false;  // since an edit, with the weights of before; of live pictures: not kept
     std::uint64_t generation = 0;
     float radiance_scale = 0.0f;   // unit of A in training; 0 until a pass had light
     float published_scale = 1.0f;  // the same of the published snapshot

@@ -195,7 +195,7 @@ bool Trainer::train_batch(NetworkState& state, Team& team, std::size_t first_chu
     for (std::size_t i = 0; i < count; ++i) {
         loss += loss_[i];
     }
-    AdamStep step = adam_schedule(layout_->config, state.step);
+    AdamStep step = adam_schedule(layout_->config, state.step, state.goes_on);
     const double limit = static_cast<double>(layout_->config.gradient_clip);
     const double norm = std::sqrt(norm2);
     step.gradient_scale = norm > limit ? static_cast<float>(limit / norm) : 1.0f;

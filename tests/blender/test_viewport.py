@@ -242,15 +242,53 @@ def step_split_area():
         bpy.ops.screen.area_split(direction="VERTICAL", factor=0.4)
 
 
-def step_close_area():
-    views = [a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D"]
-    for view in views:
+def views() -> list:
+    window = bpy.context.window_manager.windows[0]
+    return [a for a in window.screen.areas if a.type == "VIEW_3D"]
+
+
+def step_several_views():
+    assert len(views()) == 2
+    for view in views():
         view.spaces[0].shading.type = "RENDERED"
-    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
-    if len(views) > 1:
-        window = bpy.context.window_manager.windows[0]
-        with bpy.context.temp_override(window=window, area=views[-1]):
-            bpy.ops.screen.area_close()
+    views()[0].spaces[0].region_3d.view_perspective = "ORTHO"
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
+def step_several_views_show_theirs():
+    from pharos.viewport import viewport_of
+
+    shown = [viewport_of(view) for view in views()]
+    assert all(shown) and shown[0].session is not shown[1].session
+    for view, own in zip(views(), shown):
+        assert own.session.wait(0.0), "still rendering"
+        pixels = own.session.picture()[0]
+        region = next(r for r in view.regions if r.type == "WINDOW")
+        assert pixels.shape[:2] == (region.height, region.width), pixels.shape
+        assert np.abs(pixels[:, :, :3] - (0.2, 0.5, 0.1)).max() < 1e-3
+
+
+def step_close_area():
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=views()[-1]):
+        bpy.ops.screen.area_close()
+
+
+def step_material_preview():
+    window = bpy.context.window_manager.windows[0]
+    red = bpy.data.materials["Red"]
+    with bpy.context.temp_override(window=window, area=area(), id=red):
+        assert bpy.ops.ed.lib_id_generate_preview() == {"FINISHED"}
+
+
+def step_material_preview_shows():
+    """Its emission is (0, 0.9, 0.9); the host's own icon would not know a frame of ours."""
+    preview = bpy.data.materials["Red"].preview
+    width, height = preview.image_size
+    assert width > 0 and height > 0, (width, height)
+    pixels = np.array(preview.image_pixels_float).reshape(height, width, 4)
+    middle = pixels[height // 2, width // 2]
+    assert middle[0] < 0.1 and middle[1] > 0.8 and middle[2] > 0.8, middle
 
 
 def thread_count() -> int:
