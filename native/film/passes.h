@@ -46,7 +46,7 @@ enum class FilmPass : std::uint8_t {
     TransmissionDirect,
     TransmissionIndirect,
     TransmissionColor,
-    Effort,  // variance times cost: squared difference from the mean, times rays
+    Effort,  // rays times squared difference from the mean so far: merged parts give about that
     Count
 };
 

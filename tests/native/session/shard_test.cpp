@@ -66,6 +66,9 @@ double largest_difference(const MergedPicture& a, const MergedPicture& b) {
     EXPECT_EQ(b.passes.size(), kFilmPasses);
     for (std::size_t p = 0; p < a.passes.size(); ++p) {
         EXPECT_EQ(a.passes[p].name, b.passes[p].name);
+        if (a.passes[p].name == film_pass_info(FilmPass::Effort).name) {
+            continue;  // a sample's difference from those before it, which no other part has
+        }
         for (std::size_t i = 0; i < a.passes[p].pixels.size(); ++i) {
             const auto x = static_cast<double>(a.passes[p].pixels[i]);
             const auto y = static_cast<double>(b.passes[p].pixels[i]);
