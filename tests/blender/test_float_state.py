@@ -148,6 +148,8 @@ def _sessions(module, watch: Watch) -> None:
         session.read(module.FilmPass.Combined, pixels)
         _raises(session.read, module.FilmPass.Combined, pixels[:1].copy())
         assert not session.read_aov(99, pixels)
+        assert session.effort() == []
+        assert isinstance(session.field(), bytes)
         with watch.odd("the end of a session"):
             del session
     with watch.odd("the end of a session that renders"):
