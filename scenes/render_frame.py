@@ -41,11 +41,15 @@ def save(scene, folder, out, file_format, depth):
 
 
 def stay_in_the_folder(scene, out):
-    """What the scene would write elsewhere: files of its compositor, checkpoints of its frames."""
+    """What the scene would write elsewhere: files of its compositor, checkpoints of its frames, and
+    what its network has learned."""
     trees = [*bpy.data.node_groups, *(s.node_tree for s in bpy.data.scenes if s.node_tree)]
     for tree in trees:
         for node in tree.nodes:
             node.mute = node.mute or node.bl_idname == "CompositorNodeOutputFile"
+    for each in bpy.data.scenes:
+        if each.pharos.guide_memory == "FILE":
+            each.pharos.guide_memory = "ANIMATION"
     scene.render.filepath = out
 
 

@@ -128,20 +128,23 @@ scene.node_tree.links.new(layers.outputs[0], output.inputs[0])
 scene.render.filepath = f"{scratch}/elsewhere/frame_"
 scene.pharos.samples = 2
 scene.pharos.use_checkpoint = True
+scene.pharos.guiding, scene.pharos.guide_memory = "NEURAL", "FILE"
 END
 
 # The scene as a Blender opens it that trusts it: what is looked for below does happen there.
 is_hostile() {
-    rm -f "$scratch"/elsewhere/*
+    rm -f "$scratch"/elsewhere/* "$scratch"/hostile*.pharos_guide
     "$BLENDER" -b --factory-startup -y --addons pharos "$scratch/hostile.blend" -E PHAROS -f 1 \
         >"$scratch/trusted.err" 2>&1
-    [ -e "$scratch/elsewhere/ran" ] && [ "$(find "$scratch/elsewhere" -type f | wc -l)" -ge 2 ]
+    [ -e "$scratch/elsewhere/ran" ] && ls "$scratch"/hostile*.pharos_guide >/dev/null &&
+        [ "$(find "$scratch/elsewhere" -type f | wc -l)" -ge 2 ]
 }
 
 does_no_harm() {
-    rm -f "$scratch"/elsewhere/*
+    rm -f "$scratch"/elsewhere/* "$scratch"/hostile*.pharos_guide
     "$root/scenes/render" "$scratch/hostile.blend" -s 2 >"$scratch/paths" 2>"$scratch/hostile.err" &&
         [ -z "$(find "$scratch/elsewhere" -type f)" ] &&
+        [ -z "$(find "$scratch" -name 'hostile*.pharos_guide')" ] &&
         [ -z "$(find "$renders" -name 'hostile*checkpoint*')" ]
 }
 
