@@ -6,7 +6,6 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "scene/dump.h"
 #include "session/adaptation.h"
 
 namespace pharos::cli {
@@ -15,9 +14,8 @@ namespace {
 
 constexpr double kNear = 1.2;  // of the settled error: the guide has followed
 
-struct Options : CommonOptions {
+struct Options : MeasureOptions {
     AdaptationSettings adaptation;
-    std::vector<std::uint32_t> size;
 };
 
 void parse_option(const std::string& name, const std::string& value, Options& options) {
@@ -37,8 +35,6 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         a.reference = std::max(parse_number<std::uint32_t>(name, value), 1u);
     } else if (name == "--seeds") {
         a.seeds = std::max(parse_number<std::uint32_t>(name, value), 1u);
-    } else if (name == "--size") {
-        options.size = parse_list(name, value);
     } else {
         throw UsageError("unknown option '" + name + "'");
     }
@@ -116,15 +112,8 @@ int adapt(const std::vector<std::string>& arguments) {
         walk_arguments(arguments, no_flags, [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
-    if (options.input.empty() || (!options.size.empty() && options.size.size() != 2)) {
-        throw UsageError("adapt needs an input file; --size is W,H");
-    }
     options.adaptation.threads = options.threads;
-    SceneDescription description = read_dump(options.input);
-    options.apply(description.settings);
-    if (!options.size.empty()) {
-        set_size(description.film, options.size[0], options.size[1]);
-    }
+    const SceneDescription description = options.load("adapt");
     print(measure_adaptation(description, options.adaptation));
     return 0;
 }

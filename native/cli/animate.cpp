@@ -5,16 +5,14 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
-#include "scene/dump.h"
 #include "session/animation.h"
 
 namespace pharos::cli {
 
 namespace {
 
-struct Options : CommonOptions {
+struct Options : MeasureOptions {
     AnimationSettings animation;
-    std::vector<std::uint32_t> size;
 };
 
 void parse_option(const std::string& name, const std::string& value, Options& options) {
@@ -30,8 +28,6 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         a.frames = std::max(parse_number<std::uint32_t>(name, value), 2u);
     } else if (name == "--reference") {
         a.reference = std::max(parse_number<std::uint32_t>(name, value), 1u);
-    } else if (name == "--size") {
-        options.size = parse_list(name, value);
     } else {
         throw UsageError("unknown option '" + name + "'");
     }
@@ -88,15 +84,8 @@ int animate(const std::vector<std::string>& arguments) {
         walk_arguments(arguments, flag, [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
-    if (options.input.empty() || (!options.size.empty() && options.size.size() != 2)) {
-        throw UsageError("animate needs an input file; --size is W,H");
-    }
     options.animation.threads = options.threads;
-    SceneDescription description = read_dump(options.input);
-    options.apply(description.settings);
-    if (!options.size.empty()) {
-        set_size(description.film, options.size[0], options.size[1]);
-    }
+    const SceneDescription description = options.load("animate");
     print(measure_animation(description, options.animation));
     return 0;
 }

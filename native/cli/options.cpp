@@ -8,6 +8,7 @@
 
 #include "core/atomic_file.h"
 #include "film/passes.h"
+#include "scene/dump.h"
 
 namespace pharos::cli {
 
@@ -74,10 +75,27 @@ const char* guiding_name(GuidingMode mode) {
     return kGuidingNames[static_cast<std::size_t>(mode)];
 }
 
-void set_size(FilmDescription& film, std::uint32_t width, std::uint32_t height) {
-    film.width = film.crop_width = width;
-    film.height = film.crop_height = height;
-    film.crop_x = film.crop_y = 0;
+bool MeasureOptions::take(const std::string& name, const std::string& value) {
+    if (name == "--size") {
+        size = parse_list(name, value);
+        return true;
+    }
+    return CommonOptions::take(name, value);
+}
+
+SceneDescription MeasureOptions::load(const std::string& command) const {
+    if (input.empty() || (!size.empty() && size.size() != 2)) {
+        throw UsageError(command + " needs an input file; --size is W,H");
+    }
+    SceneDescription description = read_dump(input);
+    apply(description.settings);
+    if (!size.empty()) {
+        FilmDescription& film = description.film;
+        film.width = film.crop_width = size[0];
+        film.height = film.crop_height = size[1];
+        film.crop_x = film.crop_y = 0;
+    }
+    return description;
 }
 
 std::vector<std::byte> read_bytes(const std::string& path) {

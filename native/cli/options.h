@@ -51,8 +51,15 @@ struct CommonOptions {
     void apply(RenderSettings& settings) const;
 };
 
-// All of a picture of this size.
-void set_size(FilmDescription& film, std::uint32_t width, std::uint32_t height);
+// What the commands that measure take as well: a size of their own.
+struct MeasureOptions : CommonOptions {
+    std::vector<std::uint32_t> size;  // width and height; empty: the file's
+
+    [[nodiscard]] bool take(const std::string& name, const std::string& value);
+
+    // The input with these options on it; UsageError naming the command where they do not fit.
+    [[nodiscard]] SceneDescription load(const std::string& command) const;
+};
 
 // Throws std::runtime_error where there is nothing to read, and WriteError.
 [[nodiscard]] std::vector<std::byte> read_bytes(const std::string& path);

@@ -7,7 +7,6 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "core/parallel.h"
-#include "scene/dump.h"
 #include "session/guide_controller.h"
 #include "session/guide_costs.h"
 #include "session/settling.h"
@@ -18,9 +17,8 @@ namespace {
 
 constexpr double kBudget = FrameBudget{}.guide;
 
-struct Options : CommonOptions {
+struct Options : MeasureOptions {
     SettlingSettings settling;
-    std::vector<std::uint32_t> size;
 };
 
 void parse_option(const std::string& name, const std::string& value, Options& options) {
@@ -39,8 +37,6 @@ void parse_option(const std::string& name, const std::string& value, Options& op
         s.budget.frame = 1e-3 * parse_number<double>(name, value);
     } else if (name == "--budget") {
         s.budget.guide = 1e-3 * parse_number<double>(name, value);
-    } else if (name == "--size") {
-        options.size = parse_list(name, value);
     } else {
         throw UsageError("unknown option '" + name + "'");
     }
@@ -91,16 +87,11 @@ int settle(const std::vector<std::string>& arguments) {
         walk_arguments(arguments, no_flags, [&](const std::string& name, const std::string& value) {
             parse_option(name, value, options);
         });
-    if (options.input.empty() || (!options.size.empty() && options.size.size() != 2) ||
-        options.settling.seconds.empty()) {
-        throw UsageError("settle needs an input file; --size is W,H, --seconds a list");
+    if (options.settling.seconds.empty()) {
+        throw UsageError("--seconds is a list of numbers");
     }
     options.settling.threads = options.threads;
-    SceneDescription description = read_dump(options.input);
-    options.apply(description.settings);
-    if (!options.size.empty()) {
-        set_size(description.film, options.size[0], options.size[1]);
-    }
+    const SceneDescription description = options.load("settle");
     const Settling settling = measure_settling(description, options.settling);
     print(settling, options.settling);
     print_budget(settling, description.film, options.threads);

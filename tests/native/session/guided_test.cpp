@@ -38,6 +38,16 @@ GuidingField poisoned_field(const Bounds3& box, const Vec3& direction, ThreadPoo
     return field;
 }
 
+double mean_red(const Film& film) {
+    std::vector<float> pixels(std::size_t{4} * film.width() * film.height());
+    film.read(FilmPass::Combined, pixels);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < pixels.size(); i += 4) {
+        sum += static_cast<double>(pixels[i]);
+    }
+    return 4.0 * sum / static_cast<double>(pixels.size());
+}
+
 TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
     ThreadPool pool(2);
     for (const bool nee : {true, false}) {
@@ -60,13 +70,8 @@ TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
             Integrator integrator(*scene, pool);
             SharedFilm film(frame);
             ASSERT_TRUE(integrator.render_pass({0, 1024}, guiding, film, {cancel, {}}));
-            std::vector<float> pixels(estimate.size() * 4);
-            film.film.read(FilmPass::Combined, pixels);
-            double mean = 0.0;
-            for (std::size_t i = 0; i < pixels.size(); i += 4) {
-                mean += static_cast<double>(pixels[i]) / static_cast<double>(estimate.size());
-            }
-            EXPECT_NEAR(mean / exact, 1.0, 3e-3) << "nee " << nee << ", roulette " << roulette;
+            EXPECT_NEAR(mean_red(film.film) / exact, 1.0, 3e-3)
+                << "nee " << nee << ", roulette " << roulette;
             EXPECT_EQ(integrator.statistics().nonfinite, 0u);
         }
     }
@@ -94,13 +99,7 @@ TEST(GuidedStatistics, ALimitedPoisonedGuideKeepsTheClosedForm) {
         Integrator integrator(*scene, pool);
         SharedFilm film(frame);
         ASSERT_TRUE(integrator.render_pass({0, 1024}, guiding, film, {cancel, {}}));
-        std::vector<float> pixels(std::size_t{32} * 24 * 4);
-        film.film.read(FilmPass::Combined, pixels);
-        double mean = 0.0;
-        for (std::size_t i = 0; i < pixels.size(); i += 4) {
-            mean += static_cast<double>(pixels[i]) / (32.0 * 24.0);
-        }
-        EXPECT_NEAR(mean / exact, 1.0, 3e-3) << "ranks " << whole;
+        EXPECT_NEAR(mean_red(film.film) / exact, 1.0, 3e-3) << "ranks " << whole;
         BatchStatistics statistics = integrator.statistics();
         EXPECT_LT(statistics[Stage::QueryGuidingField].items, asked) << "ranks " << whole;
         asked = statistics[Stage::QueryGuidingField].items;
