@@ -143,6 +143,7 @@ class FinalRender:
             checkpoint,
             60.0 * self._scene.pharos.checkpoint_interval,
             memory.earlier(checkpoint),
+            memory.keeps,
         )
         try:
             self._poll(session, result)

@@ -57,7 +57,7 @@ class GuideMemory:
         self._key = (scene.name, layer, view)
         memory = "NONE" if engine.is_preview else scene.pharos.guide_memory
         self._file = _file_for(self._key) if memory == "FILE" else None
-        self._keeps = memory != "NONE" and (engine.is_animation or self._file is not None)
+        self.keeps = memory != "NONE" and (engine.is_animation or self._file is not None)
 
     def earlier(self, checkpoint: str) -> bytes:
         """What the render starts from; empty: from nothing.
@@ -65,7 +65,7 @@ class GuideMemory:
         What it starts from lies beside its checkpoint, so that a render that was stopped goes on as
         it began.
         """
-        if not self._keeps:
+        if not self.keeps:
             return b""
         if checkpoint and Path(checkpoint).is_file():
             return _read(checkpoints.start_of(checkpoint))
@@ -79,7 +79,7 @@ class GuideMemory:
 
     def remember(self, session) -> str:
         """Takes what a finished render has learned; says what went wrong, else nothing."""
-        field = session.field() if self._keeps else b""
+        field = session.field() if self.keeps else b""
         if not field:
             return ""
         _learned[self._key] = field

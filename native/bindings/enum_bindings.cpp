@@ -117,7 +117,8 @@ void bind_session_enums(py::module_& m) {
                              {"Learning", GuideState::Learning},
                              {"Unproven", GuideState::Unproven},
                              {"Guiding", GuideState::Guiding},
-                             {"Closed", GuideState::Closed}});
+                             {"Closed", GuideState::Closed},
+                             {"Brief", GuideState::Brief}});
     enumeration<Severity>(
         m,
         "Severity",

@@ -152,11 +152,13 @@ void bind_session(py::module_& m) {
                         unsigned threads,
                         const std::string& checkpoint,
                         double interval,
-                        const py::bytes& field) {
+                        const py::bytes& field,
+                        bool keeps_field) {
                 SessionOptions options;
                 const auto bytes = std::as_bytes(std::span<const char>(std::string_view(field)));
                 options.field.assign(bytes.begin(), bytes.end());
                 options.field_learns = true;
+                options.least_guided_samples = keeps_field ? 0 : kLeastGuidedSamples;
                 const py::gil_scoped_release release;
                 options.threads = threads;
                 options.checkpoint = {checkpoint, interval, Resume::IfItFits};
@@ -168,8 +170,12 @@ void bind_session(py::module_& m) {
             py::arg("checkpoint") = "",
             py::arg("checkpoint_interval") = 300.0,
             py::arg("field") = py::bytes(),
+            py::arg("keeps_field") = false,
             "Takes the description over: it is empty afterwards. Goes on from the checkpoint where "
-            "it is one of this render. The guide learns on from `field`, if it fits.")
+            "it is one of this render. The guide learns on from `field`, if it fits; what it has "
+            "learned serves another picture where `keeps_field` is true: it learns from pictures "
+            "of "
+            "few samples too, then.")
         .def("cancel", &RenderSession::cancel, FreeGuard())
         .def(
             "wait",

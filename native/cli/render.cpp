@@ -300,6 +300,9 @@ int render(const std::vector<std::string>& arguments) {
     if (!options.save_field.empty() && description.settings.guiding == GuidingMode::Off) {
         throw UsageError("--save-field has nothing to save: guiding is off");
     }
+    if (options.save_field.empty()) {
+        options.session.least_guided_samples = kLeastGuidedSamples;
+    }
     const ShardInfo info = shard_info(description, options);
     RenderSession session(std::move(description), options.session);
     const int code = wait_for_end(session, options.strict);

@@ -120,6 +120,10 @@ void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixe
     plan_next();
 }
 
+void GuideController::stay_out() {
+    status_.brief = selection_.has_value();
+}
+
 void GuideController::set_budget(const GuideBudget& budget) {
     budget_ = budget;
     plan_next();
@@ -150,7 +154,7 @@ void GuideController::plan_next() {
 }
 
 std::array<double, 2> GuideController::weight(std::uint32_t first_sample) const {
-    return continued_ ? std::array{1.0, 1.0} : weights_.of(first_sample);
+    return continued_ || status_.brief ? std::array{1.0, 1.0} : weights_.of(first_sample);
 }
 
 std::uint32_t GuideController::most_samples(std::uint32_t done) const {
@@ -176,7 +180,7 @@ void GuideController::see(const Film& film, std::uint32_t done) {
 
 GuidingContext GuideController::next_pass() const {
     GuidingContext context;
-    if (!enabled_ || status_.closed) {
+    if (!enabled_ || status_.closed || status_.brief) {
         return context;
     }
     context.record = !frozen_;
@@ -264,7 +268,7 @@ void GuideController::learn(RecordBuffer records,
 }
 
 void GuideController::rest() {
-    if (enabled_ && selection_ && !frozen_) {
+    if (enabled_ && selection_ && !frozen_ && !status_.brief) {
         status_.closed = selection_->update({}, {}).closed;
     }
 }

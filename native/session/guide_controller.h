@@ -33,10 +33,16 @@ class GuideController {
     // proven has to be proven anew.
     void begin_picture(const Bounds3& scene_box, std::uint64_t pixels, bool edited);
 
+    // The picture is over before what is learned could pay: nothing is recorded or guided, all
+    // passes count alike. Nothing of it where the guide serves whether it pays or not (SLIDES).
+    void stay_out();
+
     // For live pictures, before one begins: what a frame may spend. Without it all is spent.
     void set_budget(const GuideBudget& budget);
 
-    [[nodiscard]] bool learning() const { return enabled_ && !frozen_ && !status_.closed; }
+    [[nodiscard]] bool learning() const {
+        return enabled_ && !frozen_ && !status_.closed && !status_.brief;
+    }
 
     // Samples that the next pass should take at most, after `done` of them: few while much is
     // learned from each.

@@ -9,6 +9,7 @@ namespace pharos {
 struct GuideStatus {
     bool enabled = false;        // guiding was asked for
     bool closed = false;         // it does not pay here: nothing is guided or recorded
+    bool brief = false;          // it could not pay: the picture has too few samples
     double guided_share = 0.0;   // of the vertices judged last
     double moment_ratio = 1.0;   // second moment with the guide over that without
     float loss = 0.0f;           // of the last training
@@ -30,12 +31,16 @@ enum class GuideState : std::uint8_t {
     Learning,  // no snapshot is published yet
     Unproven,  // it has learned, but no region has shown yet that it gains
     Guiding,
-    Closed  // it does not pay in this scene: recording and training have stopped
+    Closed,  // it does not pay in this scene: recording and training have stopped
+    Brief    // the picture ends before learning could pay
 };
 
 [[nodiscard]] constexpr GuideState guide_state(const GuideStatus& status) {
     if (!status.enabled) {
         return GuideState::Off;
+    }
+    if (status.brief) {
+        return GuideState::Brief;
     }
     if (status.closed) {
         return GuideState::Closed;
@@ -57,6 +62,8 @@ enum class GuideState : std::uint8_t {
             return "off until it is proven to gain";
         case GuideState::Closed:
             return "off: it does not pay in this scene";
+        case GuideState::Brief:
+            return "off: too few samples to learn from";
         case GuideState::Guiding:
             break;
     }

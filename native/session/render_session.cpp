@@ -270,6 +270,9 @@ GuideController RenderSession::Impl::make_guide(const Scene& scene) {
     GuideController guide(next.mode, next.scene_box, next.pixels);
     if (!options.field_learns && !options.field.empty()) {
         freeze_field(options.field, next.mode, guide);
+    } else if (next.pixels * scene.description.settings.samples < options.least_guided_samples &&
+               !passes.wants_any(kGuidePasses)) {
+        guide.stay_out();
     }
     return guide;
 }

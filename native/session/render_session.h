@@ -67,6 +67,10 @@ struct SessionSnapshot {
     std::vector<float> combined;  // RGBA
 };
 
+// At so many camera samples learning has paid for itself in hard scenes, and in easy ones the guide
+// has closed (`tests/benchmark/run`, 128 x 96 pixels: at half of them both lose a quarter).
+inline constexpr std::uint64_t kLeastGuidedSamples = 160000;
+
 struct SessionOptions {
     unsigned threads = 0;  // 0: one per core
     // A snapshot is kept at the end of the first pass that reaches each of these.
@@ -79,6 +83,9 @@ struct SessionOptions {
     // goes on learning from where it was, or, where it does not fit, starts anew and reports why.
     std::vector<std::byte> field;
     bool field_learns = false;
+    // Camera samples in all under which a picture is unguided, where no field is given and none of
+    // the guide's passes is asked for. 0: as where what is learned serves the next picture.
+    std::uint64_t least_guided_samples = 0;
     CheckpointOptions checkpoint;
 };
 

@@ -22,7 +22,7 @@ def test_no_sample_of_our_scenes_is_dropped():
         scene.pharos.samples = 16
         for guide in GUIDES:
             scene.pharos.guiding = guide
-            session = harness.native().RenderSession(harness.exported(), 2)
+            session = harness.native().RenderSession(harness.exported(), 2, keeps_field=True)
             assert session.wait(120.0), path
             progress = session.progress()
             assert progress.state == harness.native().SessionState.Finished, progress.error

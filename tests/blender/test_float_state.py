@@ -107,6 +107,7 @@ def _room() -> None:
     harness.link(bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT")))
     harness.set_world((0.5, 0.6, 0.7))
     scene.pharos.guiding = "NEURAL"
+    bpy.context.view_layer.pharos.use_pass_guide_share = True  # learns, small as it is
 
 
 def _descriptions(module) -> None:

@@ -10,7 +10,7 @@ _FOLDER = harness.TEMPORARY / "memory"
 
 def _scene(memory: str):
     """A box that a lamp behind a screen lights, so that there is something to learn."""
-    scene = harness.new_scene(32, 32, 24)
+    scene = harness.new_scene(32, 32, 160)  # enough to learn from
     scene.pharos.guiding, scene.pharos.guide_memory = "NEURAL", memory
     white = harness.material("White")
     shader = harness.node(white, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0))
@@ -68,6 +68,17 @@ def test_none_starts_from_nothing():
     frames = _frames(scene, "none")
     for i, frame in enumerate(frames):
         assert np.array_equal(_still(scene, i + 1, f"none{i}"), frame)
+
+
+def test_few_samples_are_not_learned_from():
+    """Unless another picture goes on from what they teach."""
+    scene = _scene("NONE")
+    scene.pharos.samples = 8
+    for keeps, is_brief in ((False, True), (True, False)):
+        session = harness.native().RenderSession(harness.exported(), 2, keeps_field=keeps)
+        assert session.wait(60.0)
+        why = session.progress().guiding.why_unguided
+        assert (why == "off: too few samples to learn from") == is_brief, why
 
 
 def test_file_beside_the_blend():

@@ -41,6 +41,7 @@ def set_scene(color) -> None:
     scene = harness.new_scene(96, 64, 4)
     bpy.context.preferences.view.render_display_type = "NONE"
     scene.pharos.guiding = "NEURAL"
+    bpy.context.view_layer.pharos.use_pass_guide_share = True  # learns, small as it is
     harness.add_camera()
     harness.add_object(harness.plane_mesh(half=10.0), harness.emission(color))
     with window_context():

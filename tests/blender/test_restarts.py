@@ -36,6 +36,7 @@ def scene() -> None:
     bpy.context.preferences.view.render_display_type = "NONE"
     made.pharos.preview_samples = 8
     made.pharos.guiding = "NEURAL"
+    bpy.context.view_layer.pharos.use_pass_guide_share = True  # learns, small as it is
     harness.add_camera()
     harness.add_object(harness.plane_mesh(half=10.0), harness.emission(COLOR))
     area().spaces[0].region_3d.view_perspective = "CAMERA"

@@ -31,6 +31,7 @@ def _room(samples: int = 2):
     obj.modifiers.new("Subdivision", "SUBSURF").render_levels = 5
     harness.set_world((0.5, 0.6, 0.7))
     scene.pharos.guiding = "NEURAL"
+    bpy.context.view_layer.pharos.use_pass_guide_share = True  # learns, small as it is
     return scene
 
 

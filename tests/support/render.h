@@ -37,8 +37,8 @@ struct Rendered {
     }
 };
 
-[[nodiscard]] inline Rendered render(SceneDescription description, unsigned threads = 0) {
-    RenderSession session(std::move(description), threads);
+[[nodiscard]] inline Rendered render(SceneDescription description, SessionOptions options) {
+    RenderSession session(std::move(description), std::move(options));
     while (!session.wait(std::chrono::milliseconds(1000))) {
     }
     Rendered result{session.progress(), session.statistics(), session.report(), {}};
@@ -49,6 +49,12 @@ struct Rendered {
         }
     }
     return result;
+}
+
+[[nodiscard]] inline Rendered render(SceneDescription description, unsigned threads = 0) {
+    SessionOptions options;
+    options.threads = threads;
+    return render(std::move(description), std::move(options));
 }
 
 }  // namespace pharos::testing

@@ -116,8 +116,15 @@ def _facts(work, row, export, peak_bytes, last):
     return facts
 
 
-def render_pharos(scene, options, runs, threads, program=None, timeout=3600):
-    """Budgets of one seed are snapshots of one render, as passes do not depend on the total."""
+def render_pharos(scene, options, runs, threads, program=None):
+    """Each picture is a render of its own, as a user asks for it: how many samples there are to be
+    decides whether learning could pay."""
+    for run in runs:
+        yield from render_snapshots(scene, options, [run], threads, program)
+
+
+def render_snapshots(scene, options, runs, threads, program=None, timeout=3600):
+    """Budgets of one seed are snapshots of one render."""
     program = str(program or ROOT / "build/release/native/pharos-cli")
     dump, export = dump_file(scene)
     for seed in dict.fromkeys(seed for _, seed in runs):

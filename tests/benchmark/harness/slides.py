@@ -69,8 +69,8 @@ def render_windows(scene, options, runs, threads, program=None):
     for seed in dict.fromkeys(seed for _, seed in runs):
         trained = [frames for frames, s in runs if s == seed]
         wanted = sorted({n for frames in trained for n in (frames, frames + WINDOW) if n})
-        shots = list(engines.render_pharos(scene, options, [(n, seed) for n in wanted], threads,
-                                           program))
+        shots = list(engines.render_snapshots(scene, options, [(n, seed) for n in wanted], threads,
+                                              program))
         between = difference(shots)
         for frames in trained:
             pixels, seconds = between(frames, frames + WINDOW)
@@ -129,7 +129,7 @@ def edge_pictures(folder, threads):
     for name in ("position", "position and normal"):
         options = table_of_engines([name])[name][0].options
         frames = [(EDGE_FRAMES, 1), (EDGE_FRAMES + WINDOW, 1)]
-        shots = list(engines.render_pharos(scene, options, frames, threads))
+        shots = list(engines.render_snapshots(scene, options, frames, threads))
         keep(name, difference(shots)(EDGE_FRAMES, EDGE_FRAMES + WINDOW)[0])
         shown = 0.5 + 0.5 * cutout(guide_direction(scene, options, threads), box)
         (folder / f"{name} direction.png").write_bytes(png.encode(png.to_srgb(shown)))
