@@ -94,7 +94,9 @@ void bind_scene_enums(py::module_& m) {
                               {"Neural", GuidingMode::Neural},
                               {"Slides", GuidingMode::Slides},
                               {"SlidesPosition", GuidingMode::SlidesPosition},
-                              {"SlidesMixture", GuidingMode::SlidesMixture}});
+                              {"SlidesMixture", GuidingMode::SlidesMixture},
+                              {"NeuralReflection", GuidingMode::NeuralReflection},
+                              {"NeuralRadiance", GuidingMode::NeuralRadiance}});
     m.attr("VISIBLE_CAMERA") = static_cast<unsigned>(kVisibleCamera);
     m.attr("VISIBLE_DIFFUSE") = static_cast<unsigned>(kVisibleDiffuse);
     m.attr("VISIBLE_GLOSSY") = static_cast<unsigned>(kVisibleGlossy);

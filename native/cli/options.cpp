@@ -15,8 +15,13 @@ namespace pharos::cli {
 namespace {
 
 // In the order of GuidingMode.
-constexpr std::array<const char*, 5> kGuidingNames{
-    "off", "neural", "slides", "slides-position", "slides-mixture"};
+constexpr std::array<const char*, 7> kGuidingNames{"off",
+                                                   "neural",
+                                                   "slides",
+                                                   "slides-position",
+                                                   "slides-mixture",
+                                                   "neural-reflection",
+                                                   "neural-radiance"};
 
 }  // namespace
 
@@ -67,8 +72,11 @@ GuidingMode parse_guiding(const std::string& text) {
             return static_cast<GuidingMode>(i);
         }
     }
-    throw UsageError("--guiding: '" + text +
-                     "' is none of off, neural, slides, slides-position, slides-mixture");
+    std::string known;
+    for (const char* name : kGuidingNames) {
+        known += (known.empty() ? "" : ", ") + std::string(name);
+    }
+    throw UsageError("--guiding: '" + text + "' is none of " + known);
 }
 
 const char* guiding_name(GuidingMode mode) {

@@ -28,4 +28,11 @@ inline void throw_if_cancelled(const CancelFlag& cancel) {
     }
 }
 
+// Null: nobody can cancel.
+inline void throw_if_cancelled(const CancelFlag* cancel) {
+    if (cancel != nullptr) {
+        throw_if_cancelled(*cancel);
+    }
+}
+
 }  // namespace pharos

@@ -30,12 +30,6 @@ namespace {
 constexpr float kLargestHalf = 65504.0f;
 constexpr std::size_t kCancelPollInterval = 1u << 18;  // texels
 
-void poll(const CancelFlag* cancel) {
-    if (cancel != nullptr) {
-        throw_if_cancelled(*cancel);
-    }
-}
-
 [[nodiscard]] std::uint16_t to_half(float v) {
     return static_cast<std::uint16_t>(
         _cvtss_sh(std::clamp(v, -kLargestHalf, kLargestHalf), _MM_FROUND_TO_NEAREST_INT));
@@ -117,7 +111,7 @@ void convert_texels(TexturePixels& pixels, const Conversion& conversion, const C
     std::uint8_t* bytes = pixels.data.data();
     for (std::size_t i = 0; i < count; ++i, bytes += channels * sizeof(Source)) {
         if (i % kCancelPollInterval == 0) {
-            poll(cancel);
+            throw_if_cancelled(cancel);
         }
         std::array<Source, 4> in{};
         std::memcpy(in.data(), bytes, channels * sizeof(Source));
@@ -198,7 +192,7 @@ Texture::Texture(TexturePixels pixels,
                                     std::to_string(pixels_.height) + " texels of " +
                                     std::to_string(pixels_.channels) + " channels");
     }
-    poll(cancel);
+    throw_if_cancelled(cancel);
     zero_non_finite(pixels_);
 
     Conversion conversion;
@@ -215,7 +209,7 @@ Texture::Texture(TexturePixels pixels,
     if (conversion.changes_texels()) {
         convert(pixels_, conversion, cancel);
     }
-    poll(cancel);
+    throw_if_cancelled(cancel);
     srgb_encoded_ = color_space == ImageColorSpace::Srgb && pixels_.type == TexelType::U8;
     pixels_.data.resize(expected + detail::kTexelPadding);
     mean_ = compute_mean();

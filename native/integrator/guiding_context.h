@@ -19,6 +19,8 @@ struct GuidingContext {
     const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
     bool selection_serves = true;               // false: it is off everywhere
     float fixed_share = 0.0f;                   // the least share, where there is a selection
+    bool guides_transmission = true;  // transmitting lobes too; false: they sample themselves
+    bool multiplies = true;           // the mixture by narrow reflecting lobes
     GuideLimit limit;    // vertices that are asked about anyway are served whatever it says
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;

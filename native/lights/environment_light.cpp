@@ -17,12 +17,6 @@ Rgb usable(const Rgb& radiance) {
     return out;
 }
 
-void poll(const CancelFlag* cancel) {
-    if (cancel != nullptr) {
-        throw_if_cancelled(*cancel);
-    }
-}
-
 float magnitude(const Rgb& radiance) {
     const Rgb c = glm::abs(usable(radiance));
     return (c.x + c.y + c.z) * (1.0f / 3.0f);
@@ -44,7 +38,7 @@ std::vector<float> footprint_means(std::span<const Rgb> radiance,
     std::vector<float> value(radiance.size());
     std::vector<float> along_x(value.size());
     for (std::size_t y = 0; y < height; ++y) {
-        poll(cancel);
+        throw_if_cancelled(cancel);
         float* row = value.data() + y * width;
         for (std::size_t x = 0; x < width; ++x) {
             row[x] = magnitude(radiance[y * width + x]);
@@ -55,7 +49,7 @@ std::vector<float> footprint_means(std::span<const Rgb> radiance,
         }
     }
     for (std::size_t y = 0; y < height; ++y) {
-        poll(cancel);
+        throw_if_cancelled(cancel);
         const float* row = along_x.data() + y * width;
         const float* below = y == 0 ? row : row - width;
         const float* above = y + 1 == height ? row : row + width;
@@ -83,7 +77,7 @@ EnvironmentLight::EnvironmentLight(std::span<const Rgb> radiance,
     std::vector<float> weights = footprint_means(radiance, width, height, cancel);
     double mean[3] = {0.0, 0.0, 0.0};
     for (std::uint32_t y = 0; y < height; ++y) {
-        poll(cancel);
+        throw_if_cancelled(cancel);
         const double measure = row_measure(y, height);
         for (std::uint32_t x = 0; x < width; ++x) {
             const std::size_t i = std::size_t{y} * width + x;
@@ -97,9 +91,9 @@ EnvironmentLight::EnvironmentLight(std::span<const Rgb> radiance,
     for (int c = 0; c < 3; ++c) {
         mean_[c] = static_cast<float>(mean[c] / (2.0 * width));
     }
-    poll(cancel);
+    throw_if_cancelled(cancel);
     map_ = Distribution2D(weights, width, height);
-    poll(cancel);
+    throw_if_cancelled(cancel);
     // Cosines of the rows' edges and the inverse solid angle of a texel.
     row_cosine_.resize(std::size_t{height} + 1);
     row_density_.resize(height);

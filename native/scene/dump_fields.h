@@ -50,7 +50,7 @@ constexpr PixelFilter last_enumerator(PixelFilter) {
 }
 
 constexpr GuidingMode last_enumerator(GuidingMode) {
-    return GuidingMode::SlidesMixture;
+    return GuidingMode::NeuralRadiance;
 }
 
 // Unknown operations are the business of compile_material(), which reports them.

@@ -60,6 +60,10 @@ enum class GuidingMode : std::uint32_t {
     Slides,          // the thesis' model: one lobe
     SlidesPosition,  // of the position alone, for comparison
     SlidesMixture,   // its loss on as many lobes as Neural has, for comparison
+    // What parts of Neural are worth: transmitting lobes left to the material, no product with the
+    // reflecting lobe.
+    NeuralReflection,
+    NeuralRadiance,
 };
 
 struct RenderSettings {

@@ -60,12 +60,19 @@ constexpr std::uint32_t kPassGoneOnFrom = 2;
 constexpr float kMaxGrowth = 2.0f;
 constexpr float kMinPart = 0.25f;
 
+[[nodiscard]] bool is_neural(GuidingMode mode) {
+    return mode == GuidingMode::Neural || mode == GuidingMode::NeuralReflection ||
+           mode == GuidingMode::NeuralRadiance;
+}
+
 }  // namespace
 
 GuidingConfig guiding_config(GuidingMode mode) {
     switch (mode) {
         case GuidingMode::Off:
         case GuidingMode::Neural:
+        case GuidingMode::NeuralReflection:
+        case GuidingMode::NeuralRadiance:
             break;
         case GuidingMode::Slides:
             return GuidingConfig::slides();
@@ -81,14 +88,15 @@ GuidingConfig guiding_config(GuidingMode mode) {
 }
 
 GuideController::GuideController(GuidingMode mode, const Bounds3& scene_box, std::uint64_t pixels)
-    : enabled_(mode != GuidingMode::Off && !scene_box.empty()),
+    : mode_(mode),
+      enabled_(mode != GuidingMode::Off && !scene_box.empty()),
       box_(scene_box),
       pixels_(pixels),
       record_probability_(pixels < 65536 ? 1.0f : kFirstRecordProbability) {
     status_.enabled = enabled_;
     if (enabled_) {
         field_.emplace(guiding_config(mode), scene_box);
-        if (mode == GuidingMode::Neural) {
+        if (is_neural(mode)) {
             selection_.emplace(scene_box);
         }
     }
@@ -191,6 +199,8 @@ GuidingContext GuideController::next_pass() const {
         return context;
     }
     context.field = &*field_;
+    context.guides_transmission = mode_ != GuidingMode::NeuralReflection;
+    context.multiplies = mode_ != GuidingMode::NeuralRadiance;
     if (!selection_) {
         context.fixed_share = kSlidesShare;
         return context;

@@ -103,6 +103,7 @@ class GuideController {
 
     void read_state(StateReader& in);
 
+    GuidingMode mode_;
     bool enabled_;
     bool frozen_ = false;
     Bounds3 box_;  // of the scene

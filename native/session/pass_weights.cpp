@@ -11,7 +11,8 @@ namespace {
 // Over this the guide learns so much in its first passes that they are better weighted down.
 constexpr double kHardVariance = 4.0;
 constexpr double kMaxSquare = 2000.0;
-constexpr double kFloor = 0.1;  // of the mean
+constexpr double kFloor = 0.1;  // of the usual brightness
+constexpr int kDimmings = 2;    // of what is brighter than usual, to find it
 constexpr int kRadius = 3;
 constexpr double kUnit = 1 << 20;  // of what is summed up, relative to the mean
 constexpr double kMaxRelative = 1e9;
@@ -76,6 +77,26 @@ int own_pixels(int x, int y, int width, int height) {
     return (area + (own_corner ? 1 : 0)) / 2;
 }
 
+// Brightness of windows, in units of the mean: the mean once more without what a lamp or a window
+// in sight adds to it, which would make the noise of all else look small.
+double usual_brightness(const std::vector<double>& windows) {
+    double usual = 1.0;
+    for (int i = 0; i < kDimmings; ++i) {
+        double sum = 0.0;
+        for (const double window : windows) {
+            sum += std::min(window, usual);
+        }
+        usual = sum / static_cast<double>(windows.size());
+    }
+    return usual;
+}
+
+// A pixel's variance of one sample over the square of its neighbourhood, both in units of the mean.
+struct PixelNoise {
+    double half_square = 0.0;
+    double window = 0.0;
+};
+
 }  // namespace
 
 std::array<double, 2> relative_variance(const FirstPasses& passes) {
@@ -109,22 +130,30 @@ std::array<double, 2> relative_variance(const FirstPasses& passes) {
                     static_cast<std::int64_t>(relative * kUnit);
             }
         }
-        double total = 0.0;
-        double lit = 0.0;
+        std::vector<PixelNoise> noise;
+        std::vector<double> brightness;
         windows.for_each(values, [&](int x, int y, std::int64_t window) {
-            if ((x + y) % 2 != color || window == 0) {
+            if ((x + y) % 2 != color) {
                 return;
             }
-            lit += 1.0;
-            const auto i = static_cast<std::size_t>(y * width + x);
-            const double d =
-                (static_cast<double>(passes.first[i]) - static_cast<double>(passes.second[i])) /
-                mean;
             const int count = own_pixels(x, y, width, height);
-            const double unit = std::max(static_cast<double>(window) / (kUnit * count), kFloor);
-            total += std::min(0.5 * d * d / (unit * unit), kMaxSquare);
+            brightness.push_back(static_cast<double>(window) / (kUnit * count));
+            if (window > 0) {
+                const auto i = static_cast<std::size_t>(y * width + x);
+                const double d =
+                    (static_cast<double>(passes.first[i]) - static_cast<double>(passes.second[i])) /
+                    mean;
+                noise.push_back({0.5 * d * d, brightness.back()});
+            }
         });
-        out[static_cast<std::size_t>(color)] = lit > 0.0 ? total / lit : 0.0;
+        const double least = kFloor * usual_brightness(brightness);
+        double total = 0.0;
+        for (const PixelNoise& pixel : noise) {
+            const double unit = std::max(pixel.window, least);
+            total += std::min(pixel.half_square / (unit * unit), kMaxSquare);
+        }
+        out[static_cast<std::size_t>(color)] =
+            noise.empty() ? 0.0 : total / static_cast<double>(noise.size());
     }
     return out;
 }

@@ -26,11 +26,17 @@ struct LobeSummary {
            type == ClosureType::GgxGlass || type == ClosureType::Clearcoat;
 }
 
-[[nodiscard]] LobeSummary summarize(const Bsdf& bsdf) {
+[[nodiscard]] bool is_transmitting(ClosureType type) {
+    return type == ClosureType::GgxRefraction || type == ClosureType::GgxGlass ||
+           type == ClosureType::Translucent;
+}
+
+[[nodiscard]] LobeSummary summarize(const GuidingContext& guiding, const Bsdf& bsdf) {
     LobeSummary summary;
     float largest = 0.0f;
     for (const Closure& c : bsdf.closures) {
-        if (c.type == ClosureType::Transparent) {
+        if (c.type == ClosureType::Transparent ||
+            (!guiding.guides_transmission && is_transmitting(c.type))) {
             continue;
         }
         const bool microfacet = is_microfacet(c.type);
@@ -118,7 +124,7 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
     if (!recorded && !guiding.serves()) {
         return;
     }
-    const LobeSummary lobes = summarize(batch.bsdfs[s]);
+    const LobeSummary lobes = summarize(guiding, batch.bsdfs[s]);
     if (lobes.guidable < 0.25f) {
         return;
     }
@@ -184,7 +190,9 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     context.guiding.field->evaluate(query, std::span(batch.mixtures).first(queries));
     for (std::size_t q = 0; q < queries; ++q) {
         const std::uint32_t s = batch.query_surface[q];
-        multiply_by_reflection(batch.query_lobe[q], batch.bsdfs[s].wo, batch.mixtures[q]);
+        if (context.guiding.multiplies) {
+            multiply_by_reflection(batch.query_lobe[q], batch.bsdfs[s].wo, batch.mixtures[q]);
+        }
         batch.guides[s].mixture = &batch.mixtures[q];
     }
     return queries;

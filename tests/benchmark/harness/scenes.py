@@ -80,6 +80,8 @@ def all_scenes():
     own = [Scene(name, ROOT / "scenes" / f"{name}.blend", (256, 256))
            for name in ("cornell", "door", "lamp", "furnace", "outdoor", "glass")]
     own += [Scene(f"{scene.name}@128", scene.file, (128, 96), scene) for scene in own]
+    own += [Scene(name, ROOT / "scenes" / f"{name}.blend", (128, 128))
+            for name in ("frosted", "gloss", "caustic")]
     shared = [Scene(f"{name}{suffix}", SHARED / f"{name}.blend", size)
               for name in ("veach_ajar", "contemporary_bathroom")
               for suffix, size in (("", (320, 240)), ("@128", (128, 96)))]

@@ -110,7 +110,9 @@ TEST(GuidedStatistics, LearningKeepsTheClosedForm) {
     for (const GuidingMode mode : {GuidingMode::Neural,
                                    GuidingMode::Slides,
                                    GuidingMode::SlidesPosition,
-                                   GuidingMode::SlidesMixture}) {
+                                   GuidingMode::SlidesMixture,
+                                   GuidingMode::NeuralReflection,
+                                   GuidingMode::NeuralRadiance}) {
         SceneDescription description = emitting_box(48, 32);
         description.settings.guiding = mode;
         description.settings.samples = 256;
@@ -143,6 +145,28 @@ TEST(Guided, IsBitEqualForAnyNumberOfThreads) {
                 << threads << " threads";
         }
     }
+}
+
+// What transmits is left to its material, what reflects is not.
+TEST(Guided, TransmissionIsGuidedUnlessItIsLeftToTheMaterial) {
+    const auto asked = [](GuidingMode mode, const NodeProgram& program) {
+        SceneBuilder builder;
+        builder.object(sphere_mesh("ball", Vec3(0.0f), 1.0f), builder.material("ball", program));
+        builder.world(background_program(Rgb(1.0f), 1.0f));
+        builder.camera(Vec3(0, -4, 0), Vec3(0.0f), 0.6f, 16, 16);
+        SceneDescription description = builder.build();
+        description.settings.guiding = mode;
+        description.settings.samples = 8;
+        return render(std::move(description)).items("query_guiding_field");
+    };
+    const NodeProgram rough_glass = glass_program(Rgb(1.0f), 0.3f, 1.5f);
+    const NodeProgram rough_metal = glossy_program(Rgb(1.0f), 0.3f);
+    const std::uint64_t all = asked(GuidingMode::Neural, rough_glass);
+    EXPECT_GT(all, 0u);
+    // The glass' own reflection is still served, where it is most of what scatters.
+    EXPECT_LT(asked(GuidingMode::NeuralReflection, rough_glass), all / 2);
+    EXPECT_GT(asked(GuidingMode::NeuralReflection, rough_metal), 0u);
+    EXPECT_EQ(asked(GuidingMode::NeuralRadiance, rough_glass), all);
 }
 
 // A pass without a guide after one with it is what it would have been without either: when the gate

@@ -75,6 +75,22 @@ TEST(PassWeights, VarianceIsThatOfOneSample) {
     }
 }
 
+// A lamp or a bright window in the picture makes the rest of it dark beside it, not quiet.
+TEST(PassWeights, NoiseBesideALampIsSeen) {
+    constexpr std::uint32_t kSide = 128;
+    constexpr std::uint32_t kLamp = 22;  // its side: three percent of the picture
+    RareLight light(0.02, 5);
+    FirstPasses passes{kSide, kSide, {}, {}};
+    for (std::uint32_t i = 0; i < kSide * kSide; ++i) {
+        const bool in_lamp = i / kSide < kLamp && i % kSide < kLamp;
+        passes.first.push_back(in_lamp ? 3000.0f : light());
+        passes.second.push_back(in_lamp ? 3000.0f : light());
+    }
+    for (const double variance : relative_variance(passes)) {
+        EXPECT_GT(variance, 20.0);
+    }
+}
+
 // Light so rare that nearly all of the picture is black is hard to find; a black background is not.
 TEST(PassWeights, BlackPixelsTellNothing) {
     constexpr std::uint32_t kSide = 128;
