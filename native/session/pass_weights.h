@@ -29,9 +29,10 @@ struct FirstPasses {
 };
 
 // Variance of one sample relative to the square of what the neighbourhood shows, at least a tenth
-// of the usual brightness (the mean, what is much brighter left out), as the mean over the pixels of each colour in whose neighbourhood there is light (a
-// picture where light is so rare that most of it is black is a hard one), from these pixels alone.
-// One pixel counts for at most 2000. 0 for a black picture.
+// of the usual brightness (the mean, what is much brighter left out), as the mean over the pixels
+// of each colour in whose neighbourhood there is light (a picture where light is so rare that most
+// of it is black is a hard one), from these pixels alone. One pixel counts for at most 2000. 0 for
+// a black picture.
 [[nodiscard]] std::array<double, 2> relative_variance(const FirstPasses& passes);
 
 class PassWeights {
