@@ -32,7 +32,7 @@ def build():
     left, right, low, high = PANE
     kit.box("pane", (left - 0.02, 2.001, low - 0.02), (right + 0.02, 2.013, high + 0.02), frosted)
     kit.room("shaft", (left - 0.1, 2.0, low - 0.1), (right + 0.1, 3.4, high + 0.1),
-             {face: black for face in ("floor", "ceiling", "left", "right", "back")},
+             dict.fromkeys(("floor", "ceiling", "left", "right", "back"), black),
              openings=("front",))
     kit.area_lamp("lamp", 260.0, (0.12, 0.12), (0.1, 3.2, 1.7), rotation=(-84, 0, 0))
 
