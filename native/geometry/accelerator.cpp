@@ -81,10 +81,18 @@ GeometryPtr make_instance(RTCDevice device, RTCScene object, const Mat4& to_worl
     return geometry;
 }
 
-// False for rays Embree must not see: x - x is 0 for finite x and NaN otherwise.
+// Embree ends the program at coordinates above, where its assertions are compiled in.
+constexpr float kLargestCoordinate = 1.844e18f;
+
+bool within(const Vec3& v) {
+    return (std::abs(v.x) <= kLargestCoordinate) & (std::abs(v.y) <= kLargestCoordinate) &
+           (std::abs(v.z) <= kLargestCoordinate);
+}
+
+// False for rays Embree must not see; they hit nothing.
 bool traceable(const Ray& ray) {
-    const Vec3 zero = (ray.origin - ray.origin) + (ray.direction - ray.direction);
-    return zero.x + zero.y + zero.z + (ray.t_min - ray.t_min) == 0.0f && ray.t_max >= ray.t_min;
+    return within(ray.origin) & within(ray.direction) & (ray.t_min >= 0.0f) &
+           (ray.t_min <= kLargestCoordinate) & (ray.t_max >= ray.t_min);
 }
 
 // Two whole-register stores: the traversal reads these members back as vectors.

@@ -225,6 +225,7 @@ TEST(Accelerator, RespectsTheInterval) {
     EXPECT_EQ(scene.trace(Ray{origin, -down}).instance, kNone);
 }
 
+// Nor do those from so far away that Embree's own assertions would end the program.
 TEST(Accelerator, NonFiniteRaysMiss) {
     TestGeometry scene;
     scene.meshes.push_back(box_mesh("box", Vec3(-1), Vec3(1)));
@@ -233,7 +234,7 @@ TEST(Accelerator, NonFiniteRaysMiss) {
     const Ray good{Vec3(0.1f, 0.2f, 0.3f), glm::normalize(Vec3(1, 2, 3))};
     ASSERT_EQ(scene.trace(good).instance, 0u);
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    for (const float bad : {nan, kInfinity, -kInfinity}) {
+    for (const float bad : {nan, kInfinity, -kInfinity, 2e18f, -2e18f}) {
         for (int member = 0; member < 8; ++member) {
             Ray ray = good;
             float* values[] = {&ray.origin.x,
@@ -252,6 +253,11 @@ TEST(Accelerator, NonFiniteRaysMiss) {
             }
             *values[member] = bad;
             EXPECT_EQ(scene.trace(ray).instance, kNone) << "member " << member << " " << bad;
+            Hit hit;
+            const std::uint32_t all = ~0u;
+            scene.accelerator->intersect(
+                std::span(&ray, 1), std::span(&all, 1), std::span(&hit, 1), RayOrder::Coherent);
+            EXPECT_EQ(hit.instance, kNone) << "member " << member << " " << bad;
             std::uint8_t occluded = 7;
             scene.accelerator->occluded(std::span(&ray, 1), std::span(&occluded, 1));
             EXPECT_EQ(occluded, 0) << "member " << member << " " << bad;
