@@ -26,6 +26,7 @@ constexpr double kStay = 0.8;        // hysteresis: a cell that is on stays on w
 constexpr double kEnter = 1.2;       // and one that is off needs more
 constexpr double kConfidence = 0.5;  // standard errors taken off the gain before it counts
 constexpr double kKeepShare = 1.03;  // another share must be this much better
+constexpr double kClearGain = 0.95;  // S_a / S_0 of a share that gains whatever the best one does
 // Guided everywhere once so many vertices are in on-cells, and no longer when it is fewer by a
 // third. The more a path varies, the more the weight window adds to what the moments can see
 // (prototype: a factor of two on noisy scenes, a loss on quiet ones): above a relative variance of
@@ -66,6 +67,23 @@ std::uint8_t decide(const MomentEstimate& e, std::uint8_t current, double thresh
     return gain > threshold * (current > 0 ? kStay : kEnter) ? best : std::uint8_t{0};
 }
 
+BestShare best_share(const Moments& moments) {
+    BestShare best;
+    if (!(moments.moment[0] > 0.0)) {
+        return best;
+    }
+    best.moment_ratio = kInfinity;
+    for (std::size_t a = 1; a < kShares; ++a) {
+        const double ratio = moments.moment[a] / moments.moment[0];
+        if (ratio < best.moment_ratio) {
+            best.share = kShare[a];
+            best.moment_ratio = ratio;
+        }
+        best.largest = ratio < kClearGain ? kShare[a] : best.largest;
+    }
+    return best;
+}
+
 }  // namespace
 
 struct GuideSelection::Impl {
@@ -100,6 +118,7 @@ struct GuideSelection::Impl {
     std::vector<Cell> cells;
     std::vector<Parent> parents;
     Moments global;
+    std::array<Moments, 2> of_kind;            // diffuse, glossy
     std::array<Contributions, 2> contributed;  // diffuse, glossy
     double variance_sum = 0.0;
     double variance_count = 0.0;
@@ -200,19 +219,25 @@ void GuideSelection::Impl::add_records(std::span<const SelectionRecord> records,
 // order of first touch, which is not canonical: parents therefore add up whole numbers first.
 void GuideSelection::Impl::fold_pass(double variance) {
     std::vector<PassSums> parent_pass(parents.size());
-    PassSums global_pass;
+    std::array<PassSums, 2> kind_pass;
     for (Cell& cell : cells) {
         cell.sums.scale_by(kDecay);
         if (cell.pass.count > 0) {
             cell.sums.add(cell.pass.moments(variance), 1.0);
             parent_pass[cell.parent].add(cell.pass);
-            global_pass.add(cell.pass);
+            kind_pass[cell.index % 2].add(cell.pass);
             cell.pass = {};
         }
     }
     for (std::size_t i = 0; i < parents.size(); ++i) {
         parents[i].sums.scale_by(kDecay);
         parents[i].sums.add(parent_pass[i].moments(variance), 1.0);
+    }
+    PassSums global_pass;
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        global_pass.add(kind_pass[kind]);
+        of_kind[kind].scale_by(kDecay);
+        of_kind[kind].add(kind_pass[kind].moments(variance), 1.0);
     }
     global.scale_by(kDecay);
     global.add(global_pass.moments(variance), 1.0);
@@ -271,12 +296,9 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
     const double enough = kOverrideShare * noise_factor;
     override_on = on_share > (override_on ? kOverrideStay * enough : enough);
     statistics.guided_share = override_on ? 1.0 : on_share;
-    if (global.moment[0] > 0.0) {
-        const auto best = std::min_element(global.moment.begin() + 1, global.moment.end());
-        statistics.moment_ratio = *best / global.moment[0];
-        statistics.best_share = kShare[static_cast<std::size_t>(best - global.moment.begin())];
-    }
+    statistics.best = best_share(global);
     for (std::size_t kind = 0; kind < 2; ++kind) {
+        statistics.best_of_kind[kind] = best_share(shrink(of_kind[kind], global));
         if (contributed[kind].arrived > 0.0) {
             statistics.calibration[kind] = contributed[kind].expected / contributed[kind].arrived;
         }
@@ -291,7 +313,7 @@ void GuideSelection::Impl::update_gate(const SelectionStatistics& statistics) {
     const bool first_time = gate_at == kGatePasses;
     const bool hopeless = first_time && judged_passes >= kHopelessPasses &&
                           noise_factor >= kHopelessNoise &&
-                          statistics.moment_ratio > kHopelessRatio;
+                          statistics.best.moment_ratio > kHopelessRatio;
     if (unused || hopeless) {
         closed = true;
         closed_passes = 0;
@@ -368,6 +390,7 @@ void GuideSelection::save(StateWriter& out) const {
         s.cells,
         s.parents,
         s.global,
+        s.of_kind,
         s.contributed,
         s.variance_sum);
     out(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
@@ -380,7 +403,7 @@ void GuideSelection::load(StateReader& in) {
     in.expect(s.share.bytes());
     in(s.cells);
     in.expect(s.parents);
-    in(s.global, s.contributed, s.variance_sum);
+    in(s.global, s.of_kind, s.contributed, s.variance_sum);
     in(s.variance_count, s.judged_passes, s.closed_passes, s.noise_factor, s.override_on);
     in(s.closed, s.gate_at);
     const auto is_amount = [](double x) { return x >= 0.0 && x < kMaxLoadedSum; };
@@ -390,7 +413,8 @@ void GuideSelection::load(StateReader& in) {
                m.count < kMaxLoadedCount;
     };
     StateReader::require(is_finite(s.lower) && is_finite(s.scale) && is_sound(s.global) &&
-                         is_amount(s.variance_count) && is_amount(s.variance_sum) &&
+                         std::ranges::all_of(s.of_kind, is_sound) && is_amount(s.variance_count) &&
+                         is_amount(s.variance_sum) &&
                          (s.variance_count == 0.0 || s.variance_sum / s.variance_count > 0.0) &&
                          s.noise_factor > 0.0 && s.noise_factor <= 1.0);
     const auto is_share = [](std::uint8_t share) { return share < kShares; };

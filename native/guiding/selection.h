@@ -56,10 +56,17 @@ struct SelectionPass {
     double relative_variance = 0.0;  // mean over recorded paths of min(((lum L - I) / I)^2, 2000)
 };
 
+// The share a > 0 with the least second moment over some vertices.
+struct BestShare {
+    float share = 0.0f;         // 0: nothing was judged yet
+    double moment_ratio = 1.0;  // its S_a / S_0; over 1: it would do harm
+    float largest = 0.0f;       // of the shares that still gain clearly; 0: none
+};
+
 struct SelectionStatistics {
     double guided_share = 0.0;  // of the recorded vertices, by the alpha of their cells
-    double moment_ratio = 1.0;  // global best S_a / S_0 with a > 0; over 1: it would do harm
-    float best_share = 0.0f;    // its a; 0: nothing was judged yet
+    BestShare best;             // over all of them
+    std::array<BestShare, 2> best_of_kind{};  // over diffuse and over glossy ones
     // What A expected over what arrived, of diffuse and of glossy vertices; 0: unknown.
     std::array<double, 2> calibration{};
     std::uint32_t cells_on = 0;

@@ -18,7 +18,8 @@ struct GuidingContext {
     const GuidingField* field = nullptr;        // null: the field has nothing to say yet
     const GuideSelection* selection = nullptr;  // null: fixed_share everywhere
     bool selection_serves = true;               // false: it is off everywhere
-    float fixed_share = 0.0f;                   // the least share, where there is a selection
+    // The least share where there is a selection, at diffuse and at glossy vertices.
+    std::array<float, 2> fixed_share{};
     bool guides_transmission = true;  // transmitting lobes too; false: they sample themselves
     bool multiplies = true;           // the mixture by narrow reflecting lobes
     GuideLimit limit;    // vertices that are asked about anyway are served whatever it says
@@ -35,8 +36,8 @@ struct GuidingContext {
 
     // Some vertex may be guided.
     [[nodiscard]] bool serves() const {
-        return field != nullptr &&
-               (fixed_share > 0.0f || (selection != nullptr && selection_serves));
+        return field != nullptr && (fixed_share[0] > 0.0f || fixed_share[1] > 0.0f ||
+                                    (selection != nullptr && selection_serves));
     }
 };
 

@@ -35,7 +35,7 @@ void train(const Scene& scene, Integrator& integrator, ThreadPool& pool, Guiding
     for (std::uint32_t sample = 0; sample < scene.description.settings.samples; ++sample) {
         if (field.generation() > 0) {
             context.field = &field;
-            context.fixed_share = kShare;
+            context.fixed_share = {kShare, kShare};
         }
         integrator.render_pass({sample, 1}, context, picture, {never, {}});
         const RecordBuffer records = integrator.take_records();

@@ -121,7 +121,7 @@ void GuideController::begin_picture(const Bounds3& scene_box, std::uint64_t pixe
         selection_.emplace(scene_box);
     }
     pass_ = 0;
-    hard_share_ = 0.0f;
+    hard_share_ = {};
     adjoint_scale_ = {};
     status_.closed = false;
     status_.guided_share = 0.0;
@@ -154,7 +154,7 @@ void GuideController::plan_next() {
     wish.pixels = pixels_;
     wish.record_probability = record_probability_;
     if (field_ && field_->generation() > 0) {
-        wish.guides_unproven = !selection_ || hard_share_ > 0.0f;
+        wish.guides_unproven = !selection_ || serves_unproven();
         wish.guides_proven = wish.guides_unproven || status_.guided_share > 0.0;
     }
     plan_ = plan_guide(budget_, rates_, wish);
@@ -202,7 +202,7 @@ GuidingContext GuideController::next_pass() const {
     context.guides_transmission = mode_ != GuidingMode::NeuralReflection;
     context.multiplies = mode_ != GuidingMode::NeuralRadiance;
     if (!selection_) {
-        context.fixed_share = kSlidesShare;
+        context.fixed_share = {kSlidesShare, kSlidesShare};
         return context;
     }
     context.selection = &*selection_;
@@ -250,8 +250,8 @@ void GuideController::learn(RecordBuffer records,
         const SelectionStatistics selected = selection_->update(records.selection, counted);
         calibrate(selected.calibration);
         judge_hardness(selected);
-        status_.guided_share = hard_share_ > 0.0f ? 1.0 : selected.guided_share;
-        status_.moment_ratio = selected.moment_ratio;
+        status_.guided_share = serves_unproven() ? 1.0 : selected.guided_share;
+        status_.moment_ratio = selected.best.moment_ratio;
         status_.closed = selected.closed && !hard_;
         if (hard_) {
             wanted = std::clamp(hard_records(pass_) * work.vertices, wanted, kMaxRecordsPerPass);
@@ -299,8 +299,10 @@ void GuideController::read_state(StateReader& in) {
     in(pass_, hard_, hard_share_, adjoint_scale_, record_probability_, pixel_estimate_, weights_);
     in(status_);
     StateReader::require(status_.enabled == enabled && record_probability_ > 0.0f &&
-                         record_probability_ <= 1.0f && hard_share_ >= 0.0f &&
-                         hard_share_ <= kMaxHardShare);
+                         record_probability_ <= 1.0f);
+    for (const float share : hard_share_) {
+        StateReader::require(share >= 0.0f && share <= kMaxHardShare);
+    }
     for (const float scale : adjoint_scale_) {
         StateReader::require(scale >= 0.0f && scale <= static_cast<float>(kMaxCalibration));
     }
@@ -369,11 +371,17 @@ void GuideController::calibrate(const std::array<double, 2>& calibration) {
 void GuideController::judge_hardness(const SelectionStatistics& selected) {
     if (pass_ == 1) {
         hard_ = weights_.hard();
-    } else if (pass_ >= kHardTrialPasses && selected.moment_ratio > kHardMaxMomentRatio) {
+    } else if (pass_ >= kHardTrialPasses && selected.best.moment_ratio > kHardMaxMomentRatio) {
         hard_ = false;
     }
-    const bool gains = selected.moment_ratio < kHardFirstMaxMomentRatio;
-    hard_share_ = hard_ && gains ? std::min(selected.best_share, kMaxHardShare) : 0.0f;
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        const BestShare& best = selected.best_of_kind[kind];
+        const bool gains = best.moment_ratio < kHardFirstMaxMomentRatio;
+        // The weight window adds to what the moments can see: more than the best share, while it
+        // still gains.
+        const float share = std::min(std::max(best.share, best.largest), kMaxHardShare);
+        hard_share_[kind] = hard_ && gains ? share : 0.0f;
+    }
 }
 
 }  // namespace pharos

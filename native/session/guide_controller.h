@@ -101,6 +101,10 @@ class GuideController {
     void count_rates(const RecordBuffer& records, const SelectionPass& work);
     void plan_next();
 
+    [[nodiscard]] bool serves_unproven() const {
+        return hard_share_[0] > 0.0f || hard_share_[1] > 0.0f;
+    }
+
     void read_state(StateReader& in);
 
     GuidingMode mode_;
@@ -111,7 +115,7 @@ class GuideController {
     std::uint32_t pass_ = 0;
     bool continued_ = false;  // from an earlier picture
     bool hard_ = false;
-    float hard_share_ = 0.0f;  // of the guide, at least, everywhere
+    std::array<float, 2> hard_share_{};  // of the guide, at least, at diffuse and glossy vertices
     std::array<float, 2> adjoint_scale_{};
     float record_probability_;
     std::optional<GuidingField> field_;

@@ -57,7 +57,7 @@ LobeProbe probe_lobes(const Scene& scene, const GuideController& guide, const Ve
         const float proven = context.selection != nullptr
                                  ? context.selection->alpha(surface.p, surface.ns, glossy)
                                  : 0.0f;
-        return std::max(proven, context.fixed_share);
+        return std::max(proven, context.fixed_share[glossy ? 1 : 0]);
     };
     probe.diffuse_share = share(false);
     probe.glossy_share = share(true);

@@ -12,6 +12,10 @@ constexpr float kMinGuidedAlpha = kMinGuidedRoughness * kMinGuidedRoughness;
 // Under this roughness the mixture is multiplied by the reflecting lobe (prototype2, section 2).
 constexpr float kMaxProductRoughness = 0.25f;
 constexpr float kMaxProductAlpha = kMaxProductRoughness * kMaxProductRoughness;
+// Of refracting lobes by their width: the same least one, and one far under what a field tells
+// apart.
+constexpr float kMinProductKappa = 64.0f;
+constexpr float kMaxProductKappa = 2e4f;
 
 constexpr std::uint32_t kLimitSalt = 0x3c6ef372u;
 
@@ -57,19 +61,55 @@ struct LobeSummary {
     return summary;
 }
 
-// The axis and width of the lobe that the mixture is multiplied by, for a narrow dominant
-// reflection.
-void multiply_by_reflection(const Closure* lobe, const Vec3& wo, VmfMixture& mixture) {
-    if (lobe == nullptr || lobe->type != ClosureType::GgxReflection) {
-        return;
+// A lobe of the material as the product takes it; kappa 0: none, or too wide.
+struct NarrowLobe {
+    Vec3 axis{0.0f};
+    float kappa = 0.0f;
+};
+
+[[nodiscard]] NarrowLobe reflected_lobe(const Closure& lobe, const Vec3& wo, float cos_o) {
+    const float alpha = std::sqrt(lobe.alpha_x * lobe.alpha_y);
+    if (alpha > kMaxProductAlpha) {
+        return {};
     }
-    const float alpha = std::sqrt(lobe->alpha_x * lobe->alpha_y);
-    const float cos_o = glm::dot(lobe->n, wo);
-    if (alpha > kMaxProductAlpha || cos_o <= 0.0f) {
-        return;
+    return {lobe.n * (2.0f * cos_o) - wo, product_kappa(alpha, cos_o)};
+}
+
+// Refraction spreads the half vectors less than reflection does: by the ratio of the solid angles
+// (Walter et al. 2007, eq. 17, at the mean half vector).
+[[nodiscard]] NarrowLobe refracted_lobe(const Closure& lobe, const Vec3& wo, float cos_o) {
+    const float inverse = 1.0f / lobe.eta;
+    const float sin2_t = (1.0f - sqr(cos_o)) * sqr(inverse);
+    if (sin2_t >= 1.0f) {
+        return lobe.type == ClosureType::GgxGlass ? reflected_lobe(lobe, wo, cos_o) : NarrowLobe{};
     }
-    const Vec3 axis = lobe->n * (2.0f * cos_o) - wo;
-    mixture = multiply_lobe(mixture, axis, product_kappa(alpha, cos_o));
+    const float cos_t = std::sqrt(1.0f - sin2_t);
+    const float spread = sqr(cos_o - lobe.eta * cos_t) + 1e-6f;
+    const float kappa = sqr(lobe.eta) * cos_t / (spread * lobe.alpha_x * lobe.alpha_y + 1e-12f);
+    if (kappa < kMinProductKappa) {
+        return {};
+    }
+    return {lobe.n * (cos_o * inverse - cos_t) - wo * inverse, std::min(kappa, kMaxProductKappa)};
+}
+
+// The lobe that the mixture is multiplied by, where the dominant one is narrow.
+[[nodiscard]] NarrowLobe narrow_lobe(const Closure* lobe, const Vec3& wo) {
+    if (lobe == nullptr) {
+        return {};
+    }
+    const float cos_o = std::min(glm::dot(lobe->n, wo), 1.0f);
+    if (cos_o <= 0.0f) {
+        return {};
+    }
+    switch (lobe->type) {
+        case ClosureType::GgxReflection:
+            return reflected_lobe(*lobe, wo, cos_o);
+        case ClosureType::GgxRefraction:
+        case ClosureType::GgxGlass:
+            return refracted_lobe(*lobe, wo, cos_o);
+        default:
+            return {};
+    }
 }
 
 // Opens a record for a vertex of a recorded path.
@@ -142,7 +182,7 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
                              : guiding.selection->alpha(surface.p, surface.ns, glossy);
     const std::uint32_t rank = guide_rank(batch.counters[path].bounce, proven);
     const bool asked = recorded && guiding.probe;
-    guide.share = std::max(guiding.fixed_share, proven);
+    guide.share = std::max(guiding.fixed_share[glossy ? 1 : 0], proven);
     if (guiding.limit.active() && !asked && !guiding.limit.admits(rank, limit_bits(path, batch))) {
         guide.share = 0.0f;
     }
@@ -191,7 +231,10 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     for (std::size_t q = 0; q < queries; ++q) {
         const std::uint32_t s = batch.query_surface[q];
         if (context.guiding.multiplies) {
-            multiply_by_reflection(batch.query_lobe[q], batch.bsdfs[s].wo, batch.mixtures[q]);
+            const NarrowLobe lobe = narrow_lobe(batch.query_lobe[q], batch.bsdfs[s].wo);
+            if (lobe.kappa > 0.0f) {
+                batch.mixtures[q] = multiply_lobe(batch.mixtures[q], lobe.axis, lobe.kappa);
+            }
         }
         batch.guides[s].mixture = &batch.mixtures[q];
     }

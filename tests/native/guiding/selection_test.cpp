@@ -169,7 +169,7 @@ TEST(Selection, CalibrationIsWhatWasExpectedOverWhatArrived) {
     }
     EXPECT_NEAR(statistics.calibration[0], 3.0, 1e-2);
     EXPECT_NEAR(statistics.calibration[1], 0.5, 1e-2);
-    EXPECT_GT(statistics.best_share, 0.0f);
+    EXPECT_GT(statistics.best.share, 0.0f);
 }
 
 // In a quiet picture after the third pass, in a noisy one not before the ninth.
@@ -249,7 +249,10 @@ TEST(Selection, OrderOfRecordsDoesNotMatter) {
         std::rotate(records.begin(), records.begin() + 1234, records.end());
         const SelectionStatistics b = second.update(records, work());
         ASSERT_EQ(a.guided_share, b.guided_share);
-        ASSERT_EQ(a.moment_ratio, b.moment_ratio);
+        ASSERT_EQ(a.best.moment_ratio, b.best.moment_ratio);
+        for (std::size_t kind = 0; kind < 2; ++kind) {
+            ASSERT_EQ(a.best_of_kind[kind].moment_ratio, b.best_of_kind[kind].moment_ratio);
+        }
         ASSERT_EQ(a.cells_on, b.cells_on);
     }
     for (int i = 0; i < 10000; ++i) {

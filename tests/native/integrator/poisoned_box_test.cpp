@@ -85,7 +85,7 @@ double error_of(const Box& box) {
     const std::vector<float> estimate(std::size_t{kSize} * kSize, static_cast<float>(kExact));
     GuidingContext guiding;
     guiding.field = &field;
-    guiding.fixed_share = 0.5f;
+    guiding.fixed_share = {0.5f, 0.5f};
     guiding.adjoint_scale.fill(box.roulette ? 1.0f : 0.0f);
     guiding.pixel_estimate = estimate;
     Integrator integrator(*scene, pool);

@@ -64,7 +64,7 @@ TEST(GuidedStatistics, PoisonedGuideKeepsTheClosedForm) {
         for (const bool roulette : {false, true}) {
             GuidingContext guiding;
             guiding.field = &field;
-            guiding.fixed_share = 0.5f;
+            guiding.fixed_share = {0.5f, 0.5f};
             guiding.adjoint_scale.fill(roulette ? 1.0f : 0.0f);
             guiding.pixel_estimate = estimate;
             Integrator integrator(*scene, pool);
@@ -91,7 +91,7 @@ TEST(GuidedStatistics, ALimitedPoisonedGuideKeepsTheClosedForm) {
     for (const std::uint32_t whole : {kGuideRanks, 7u, 3u, 0u}) {
         GuidingContext guiding;
         guiding.field = &field;
-        guiding.fixed_share = 0.5f;
+        guiding.fixed_share = {0.5f, 0.5f};
         guiding.limit.whole = whole;
         guiding.limit.part = 0.4f;
         guiding.record = guiding.probe = true;
@@ -192,7 +192,7 @@ TEST(Guided, PassesAfterTheGuideAreThoseWithoutIt) {
     };
     GuidingContext guiding;
     guiding.field = &field;
-    guiding.fixed_share = 0.5f;
+    guiding.fixed_share = {0.5f, 0.5f};
     guiding.record = true;
     guiding.record_probability = 1.0f;
     const std::vector<float> guided = second_pass(guiding);
