@@ -219,7 +219,8 @@ TEST(LiveSession, TheGuideLivesOnUntilItIsForgotten) {
     session.set_view(view_of(description));
     static_cast<void>(finished(session));
     EXPECT_TRUE(session.progress().guide_kept);
-    EXPECT_GT(session.progress().render.guiding.snapshots, snapshots);
+    // Where all is ten times slower a frame's budget may be too small to learn anything.
+    EXPECT_GE(session.progress().render.guiding.snapshots, snapshots + (kSlowdown > 1.0 ? 0 : 1));
     description.lights[0].to_world[3].y += 0.2f;
     session.set_scene(without_content(description, 70));
     static_cast<void>(finished(session));
