@@ -299,6 +299,8 @@ SelectionStatistics GuideSelection::Impl::publish(double variance) {
     statistics.best = best_share(global);
     for (std::size_t kind = 0; kind < 2; ++kind) {
         statistics.best_of_kind[kind] = best_share(shrink(of_kind[kind], global));
+        statistics.best_of_kind[kind].part =
+            global.count > 0.0 ? of_kind[kind].count / global.count : 0.0;
         if (contributed[kind].arrived > 0.0) {
             statistics.calibration[kind] = contributed[kind].expected / contributed[kind].arrived;
         }

@@ -61,6 +61,7 @@ struct BestShare {
     float share = 0.0f;         // 0: nothing was judged yet
     double moment_ratio = 1.0;  // its S_a / S_0; over 1: it would do harm
     float largest = 0.0f;       // of the shares that still gain clearly; 0: none
+    double part = 0.0;          // of the recorded vertices, these
 };
 
 struct SelectionStatistics {

@@ -250,7 +250,7 @@ void GuideController::learn(RecordBuffer records,
         const SelectionStatistics selected = selection_->update(records.selection, counted);
         calibrate(selected.calibration);
         judge_hardness(selected);
-        status_.guided_share = serves_unproven() ? 1.0 : selected.guided_share;
+        status_.guided_share = served_part(selected);
         status_.moment_ratio = selected.best.moment_ratio;
         status_.closed = selected.closed && !hard_;
         if (hard_) {
@@ -366,6 +366,15 @@ void GuideController::calibrate(const std::array<double, 2>& calibration) {
         const bool plausible = c >= 1.0 / kMaxCalibration && c <= kMaxCalibration;
         adjoint_scale_[kind] = plausible ? static_cast<float>(1.0 / c) : 0.0f;
     }
+}
+
+// Of the recorded vertices: those of a kind that is served everywhere, and the proven ones.
+double GuideController::served_part(const SelectionStatistics& selected) const {
+    double part = 0.0;
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+        part += hard_share_[kind] > 0.0f ? selected.best_of_kind[kind].part : 0.0;
+    }
+    return std::max(part, selected.guided_share);
 }
 
 void GuideController::judge_hardness(const SelectionStatistics& selected) {

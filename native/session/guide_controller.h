@@ -96,6 +96,7 @@ class GuideController {
 
   private:
     void calibrate(const std::array<double, 2>& calibration);
+    [[nodiscard]] double served_part(const SelectionStatistics& selected) const;
     void judge_hardness(const SelectionStatistics& selected);
 
     void count_rates(const RecordBuffer& records, const SelectionPass& work);

@@ -8,9 +8,12 @@ BEGIN = "<!-- figures: made by tests/benchmark/run --publish -->"
 END = "<!-- end of figures -->"
 TITLES = {"cornell": "Cornell box", "door": "door ajar", "lamp": "lamp under its shade",
           "outdoor": "HDRI outdoors", "glass": "glass", "furnace": "white furnace",
+          "frosted": "lamp behind frosted glass", "gloss": "brushed metal", "caustic": "caustics",
           "veach_ajar": "`veach_ajar`", "contemporary_bathroom": "`contemporary_bathroom`"}
 ENGINES = {"pharos": "Pharos", "pharos-off": "Pharos without its network", "cycles": "Cycles",
            "cycles-guided": "Cycles, guided", "cycles-3.4": "Cycles 3.4.1",
+           "pharos-reflection": "Pharos, transmission unguided",
+           "pharos-radiance": "Pharos without the product",
            "pharos-slides": "the thesis' model",
            "pharos-slides-position": "the same by position alone"}
 WIDTH = 102

@@ -94,6 +94,9 @@ def all_engines():
         Engine("pharos-off", "pharos", {"guiding": "OFF"}, "pharos"),
         Engine("pharos-slides", "pharos", {"guiding": "SLIDES"}, "pharos"),
         Engine("pharos-slides-position", "pharos", {"guiding": "SLIDES-POSITION"}, "pharos"),
+        # What parts of the guide are worth: `frosted` without the first, `gloss` without the second.
+        Engine("pharos-reflection", "pharos", {"guiding": "NEURAL-REFLECTION"}, "pharos"),
+        Engine("pharos-radiance", "pharos", {"guiding": "NEURAL-RADIANCE"}, "pharos"),
         Engine("cycles", "cycles", {"guiding": False}, "cycles"),
         Engine("cycles-guided", "cycles", {"guiding": True}, "cycles"),
         Engine("cycles-3.4", "cycles-3.4", {"guiding": False}, "cycles-3.4"),

@@ -170,6 +170,7 @@ TEST(Selection, CalibrationIsWhatWasExpectedOverWhatArrived) {
     EXPECT_NEAR(statistics.calibration[0], 3.0, 1e-2);
     EXPECT_NEAR(statistics.calibration[1], 0.5, 1e-2);
     EXPECT_GT(statistics.best.share, 0.0f);
+    EXPECT_NEAR(statistics.best_of_kind[0].part + statistics.best_of_kind[1].part, 1.0, 1e-9);
 }
 
 // In a quiet picture after the third pass, in a noisy one not before the ninth.
