@@ -94,7 +94,7 @@ def all_engines():
         Engine("pharos-off", "pharos", {"guiding": "OFF"}, "pharos"),
         Engine("pharos-slides", "pharos", {"guiding": "SLIDES"}, "pharos"),
         Engine("pharos-slides-position", "pharos", {"guiding": "SLIDES-POSITION"}, "pharos"),
-        # What parts of the guide are worth: `frosted` without the first, `gloss` without the second.
+        # What parts of the guide are worth: the first in `frosted`, the second in `gloss`.
         Engine("pharos-reflection", "pharos", {"guiding": "NEURAL-REFLECTION"}, "pharos"),
         Engine("pharos-radiance", "pharos", {"guiding": "NEURAL-RADIANCE"}, "pharos"),
         Engine("cycles", "cycles", {"guiding": False}, "cycles"),

@@ -62,7 +62,7 @@ TEST(GoingOn, NextPictureIsGuidedFromItsStart) {
     ASSERT_GT(first.guiding.guided_share, 0.0);
     const Picture next = take(rooms(4), first.field);
     EXPECT_GT(next.guiding.guided_share, 0.0);
-    EXPECT_GT(next.guiding.snapshots, first.guiding.snapshots);
+    EXPECT_GT(next.guiding.records, first.guiding.records);
     EXPECT_TRUE(next.report.empty());
     EXPECT_NE(next.combined, take(rooms(4), {}).combined);
     EXPECT_EQ(next.combined, take(rooms(4), first.field, 1).combined);
