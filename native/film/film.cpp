@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/check.h"
 #include "core/color.h"
@@ -12,6 +13,12 @@ namespace {
 
 constexpr float kBackgroundDepth = 1e10f;
 constexpr std::size_t kAux = 9;  // normal, guide normal, albedo
+
+// Exposure and a pass' mean may be more together than a float holds.
+float to_float(double value) {
+    constexpr auto kLargest = static_cast<double>(std::numeric_limits<float>::max());
+    return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+}
 
 }  // namespace
 
@@ -82,7 +89,7 @@ void Film::read_on_request(FilmPass pass, std::span<float> out) const {
             const double value = color == nullptr ? block[c]
                                  : color[c] > 0.0 ? block[c] / color[c]
                                                   : 0.0;
-            out[i * channels + c] = static_cast<float>(value * scale);
+            out[i * channels + c] = to_float(value * scale);
         }
         if (pass == FilmPass::Mist) {
             // Paths write how clearly the surface shows.
@@ -99,7 +106,7 @@ void Film::read_aov(std::size_t index, std::span<float> out) const {
         const double* block = &blocks_[i * passes_.size() + place.offset];
         const double scale = weight_[i] > 0.0 ? 1.0 / weight_[i] : 0.0;
         for (std::size_t c = 0; c < place.channels; ++c) {
-            out[i * place.channels + c] = static_cast<float>(block[c] * scale);
+            out[i * place.channels + c] = to_float(block[c] * scale);
         }
     }
 }
@@ -148,14 +155,14 @@ void Film::read(FilmPass pass, std::span<float> out) const {
         if (pass == FilmPass::Combined) {
             const double exposed = scale * static_cast<double>(exposure_);
             for (std::size_t c = 0; c < 3; ++c) {
-                pixel[c] = static_cast<float>(sum_[i * 4 + c] * exposed);
+                pixel[c] = to_float(sum_[i * 4 + c] * exposed);
             }
-            pixel[3] = static_cast<float>(sum_[i * 4 + 3] * scale);
+            pixel[3] = to_float(sum_[i * 4 + 3] * scale);
         } else if (pass == FilmPass::SampleCount) {
             pixel[0] = static_cast<float>(count_[i]);
         } else {
             for (std::size_t c = 0; c < 3; ++c) {
-                pixel[c] = static_cast<float>(aux_[i * kAux + aux_offset + c] * scale);
+                pixel[c] = to_float(aux_[i * kAux + aux_offset + c] * scale);
             }
         }
     }

@@ -152,6 +152,7 @@ void SceneBuild::mend() {
     poll();
     mend_lamps(d.lights, report_);
     mend_camera(d, report_);
+    mend_film(d.film, report_);
     if (const Vec3 origin = find_origin(*scene_); origin != Vec3(0.0f)) {
         move_to_origin(*scene_, origin);
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 
 namespace pharos {
@@ -297,6 +298,13 @@ void mend_camera(SceneDescription& description, SceneReport& report) {
     if (description.has_camera && !is_usable(description.camera)) {
         report.add(Severity::Error, "Camera", "The camera's matrix or window is no number.");
         description.has_camera = false;
+    }
+}
+
+void mend_film(FilmDescription& film, SceneReport& report) {
+    if (!std::isfinite(film.exposure)) {
+        report.add(Severity::Warning, "Film", "The exposure is no number; 1 is taken.");
+        film.exposure = 1.0f;
     }
 }
 

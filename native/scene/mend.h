@@ -38,4 +38,7 @@ void mend_lamps(std::vector<LightDescription>& lamps, SceneReport& report);
 // Takes out a camera whose matrix or window is no number.
 void mend_camera(SceneDescription& description, SceneReport& report);
 
+// An exposure that is no number is 1.
+void mend_film(FilmDescription& film, SceneReport& report);
+
 }  // namespace pharos

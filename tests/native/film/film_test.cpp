@@ -1,6 +1,7 @@
 #include "film/film.h"
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -69,6 +70,19 @@ TEST(Film, ExposureScalesLightAndNothingElse) {
     EXPECT_FLOAT_EQ(combined[3], 1.0f);
     EXPECT_FLOAT_EQ(depth[0], 7.0f);
     EXPECT_FLOAT_EQ(albedo[0], 0.2f);
+}
+
+// Light near what a float holds, exposed: the most that it holds, not infinity.
+TEST(Film, ExposureDoesNotOverflow) {
+    FilmDescription description = frame(1, 1);
+    description.exposure = 1e10f;
+    Film film(description);
+    film.add(0, {.radiance = Rgb(3e38f, 1.0f, -3e38f)}, 1.0, true);
+    std::vector<float> combined(4);
+    film.read(FilmPass::Combined, combined);
+    EXPECT_EQ(combined[0], std::numeric_limits<float>::max());
+    EXPECT_EQ(combined[1], 1e10f);
+    EXPECT_EQ(combined[2], std::numeric_limits<float>::lowest());
 }
 
 TEST(Film, PassesOnRequestTakePlaceOnlyWhenWanted) {

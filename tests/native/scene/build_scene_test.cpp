@@ -258,6 +258,17 @@ TEST(BuildScene, CameraWithoutNumbersIsNoCamera) {
     EXPECT_EQ(built.report.entries().size(), 1u);
 }
 
+TEST(BuildScene, ExposureThatIsNoNumberIsOne) {
+    for (const float exposure : {kNan, kInfinity}) {
+        SceneBuilder b;
+        b.camera(Vec3(0, -3, 1), Vec3(0), 0.7f, 32, 32);
+        b.description().film.exposure = exposure;
+        const Built built = build(b.build());
+        EXPECT_EQ(built.scene->description.film.exposure, 1.0f);
+        EXPECT_EQ(built.reported("Film"), 1u);
+    }
+}
+
 TEST(BuildScene, MissingImagesAreMagentaAndReported) {
     SceneBuilder b;
     ImageUse use;
