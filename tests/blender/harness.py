@@ -84,9 +84,9 @@ def best_of(measure, bar: float, attempts: int = 3) -> float:
 def new_scene(width: int = 16, height: int = 16, samples: int = 4):
     """An empty scene rendered by Pharos, box filter, black world."""
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.images):
-        for item in list(collection):
-            if item.users == 0 or collection is not bpy.data.images:
-                collection.remove(item)
+        # At once: one by one Blender looks through all others each time.
+        bpy.data.batch_remove(
+            [x for x in collection if x.users == 0 or collection is not bpy.data.images])
     scene = bpy.context.scene
     for other in list(scene.view_layers)[1:]:
         scene.view_layers.remove(other)
