@@ -12,7 +12,7 @@ native   the C++ unit tests (ctest without the label slow)
 blender  tests/blender in Blender 3.4.1, with and without a window, and in bpy 4.5
 render   scenes/render: two pictures, a second run without building, Ctrl-C and SIGTERM
 slurm    a Slurm of two slots renders shards of a picture; skipped where it is not installed
-fuzz     libFuzzer on scenes as handed over, dumps, node programs, images, weights and checkpoints, some seconds each
+fuzz     libFuzzer on scenes as handed over, dumps, node programs, images, weights and checkpoints, 30 s each
 tidy     clang-tidy; files seen before are not looked at again, within a budget of time
 asan     unit tests under the address and undefined-behaviour sanitizers
 tsan     tests of threads, film and session under the thread sanitizer
@@ -185,7 +185,7 @@ suite_fuzz() {
         rm -rf "$LOGS/corpus_$target"
         mkdir -p "$LOGS/corpus_$target"
         ASAN_OPTIONS=detect_leaks=0 check "fuzz_$target" 180 \
-            "$PHAROS_ROOT/build/fuzz/tests/fuzz/fuzz_$target" "-max_total_time=${PHAROS_FUZZ_SECONDS:-10}" \
+            "$PHAROS_ROOT/build/fuzz/tests/fuzz/fuzz_$target" "-max_total_time=${PHAROS_FUZZ_SECONDS:-30}" \
             -len_control=0 -rss_limit_mb=4096 -timeout=25 "-artifact_prefix=$LOGS/${target}_" "$LOGS/corpus_$target"
     done
 }
