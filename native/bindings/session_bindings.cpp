@@ -172,10 +172,8 @@ void bind_session(py::module_& m) {
             py::arg("field") = py::bytes(),
             py::arg("keeps_field") = false,
             "Takes the description over: it is empty afterwards. Goes on from the checkpoint where "
-            "it is one of this render. The guide learns on from `field`, if it fits; what it has "
-            "learned serves another picture where `keeps_field` is true: it learns from pictures "
-            "of "
-            "few samples too, then.")
+            "it is one of this render. The guide learns on from `field`, if it fits. Where another "
+            "picture is to go on from this one (`keeps_field`) it learns from few samples, too.")
         .def("cancel", &RenderSession::cancel, FreeGuard())
         .def(
             "wait",

@@ -67,8 +67,9 @@ struct SessionSnapshot {
     std::vector<float> combined;  // RGBA
 };
 
-// At so many camera samples learning has paid for itself in hard scenes, and in easy ones the guide
-// has closed (`tests/benchmark/run`, 128 x 96 pixels: at half of them both lose a quarter).
+// From about so many camera samples on learning pays for itself in hard scenes
+// (`tests/benchmark/run` at 16 samples of 128 x 96 pixels, 196 608 in all); easy ones still lose
+// there.
 inline constexpr std::uint64_t kLeastGuidedSamples = 160000;
 
 struct SessionOptions {
