@@ -21,10 +21,12 @@ from . import (  # noqa: E402
     properties,
     report_rows,
     running,
+    write_flag,
 )
 
 _PARTS = (
     properties,
+    write_flag,
     engine,
     operators,
     lobes,

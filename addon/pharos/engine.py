@@ -6,7 +6,7 @@ import traceback
 
 import bpy
 
-from . import final, native
+from . import final, native, write_flag
 from .passes import wanted_passes
 from .viewport import Viewport
 
@@ -33,10 +33,8 @@ class PharosRenderEngine(bpy.types.RenderEngine):
         if hasattr(parent, "__del__"):
             parent.__del__()
 
-    def update(self, data, depsgraph):
-        """Nothing: the scene is exported where it is rendered."""
-
     def update_render_passes(self, scene=None, renderlayer=None):
+        write_flag.enter()
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
         for entry in wanted_passes(renderlayer):
             channels = entry.channels
@@ -45,10 +43,15 @@ class PharosRenderEngine(bpy.types.RenderEngine):
             )
 
     def render(self, depsgraph):
+        visit = write_flag.enter()
         module, problem = native.load()
         if module is None:
             self.report({"ERROR"}, f"Pharos: {problem}")
-            return
+        else:
+            self._render(depsgraph, module)
+        write_flag.leave(visit)
+
+    def _render(self, depsgraph, module):
         layer = depsgraph.view_layer_eval
         for entry in wanted_passes(layer):
             if not entry.built_in:

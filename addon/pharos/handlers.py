@@ -80,11 +80,15 @@ def _epoch_handlers() -> list:
 
 
 def _deliver() -> float:
-    while not _waiting.empty():
+    """Where Blender forbids to write (write_flag.py) nothing is lost: it is tried again."""
+    for _ in range(_waiting.qsize()):
         write, scene_name, what = _waiting.get()
         scene = bpy.data.scenes.get(scene_name)
-        if scene is not None:
-            write(scene, what)
+        try:
+            if scene is not None:
+                write(scene, what)
+        except AttributeError:
+            _waiting.put((write, scene_name, what))
     return 0.5
 
 

@@ -73,4 +73,24 @@ def test_objects_that_are_not_rendered_are_named():
     assert set(harness.report()) == expected, set(harness.report()) ^ expected
 
 
+def test_a_report_that_may_not_be_written_is_written_later():
+    """Blender can forbid it for a while (write_flag.py)."""
+    from pharos import handlers
+
+    scene = harness.new_scene(8, 8, 1)
+    written = []
+
+    def forbidden_once(where, what):
+        written.append((where.name, what))
+        if len(written) == 1:
+            raise AttributeError("Writing to ID classes in this context is not allowed")
+
+    handlers._post(forbidden_once, scene.name, 7)
+    assert written == [(scene.name, 7)]
+    handlers._deliver()
+    assert written == [(scene.name, 7)] * 2
+    handlers._deliver()
+    assert len(written) == 2
+
+
 harness.main(globals())
