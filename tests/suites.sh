@@ -109,8 +109,8 @@ run_ctest() {
         "$LOGS/$name.log" | head -n 30
 }
 
-# run_programs NAME SECONDS PRESET MODULES...: the unit tests of some modules (those that match
-# CHOSEN, where it is set) under a sanitizer, two programs at a time. Not by ctest: a sanitized process takes seconds to start and to end.
+# run_programs NAME SECONDS PRESET MODULES...: the unit tests of some modules under a sanitizer, two
+# programs at a time. Not by ctest: a sanitized process takes seconds to start and to end.
 run_programs() {
     local name=$1 seconds=$2 folder=$PHAROS_ROOT/build/$3/tests/native reports=$LOGS/$1 status read_report module
     local log=$LOGS/$1.log telling='ERROR: [A-Za-z]*Sanitizer|WARNING: ThreadSanitizer|runtime error|terminate called'
@@ -119,7 +119,7 @@ run_programs() {
     mkdir -p "$reports"
     printf '%s_test\n' "$@" >"$reports/programs"
     logged "$name" "$seconds" xargs -a "$reports/programs" -P 2 -I{} env "$folder/{}" --gtest_brief=1 \
-        "--gtest_filter=${CHOSEN:-}-$STATISTICAL" "--gtest_output=xml:$reports/{}.xml"
+        "--gtest_filter=-$STATISTICAL" "--gtest_output=xml:$reports/{}.xml"
     status=$?
     for module in "$@"; do
         if [ -f "$reports/${module}_test.xml" ]; then

@@ -1,5 +1,5 @@
-"""After a final render (F12) that began while a panel was being drawn, timers may write to Blender's
-data.
+"""After a final render (F12) that began while a panel was being drawn, timers may write to
+Blender's data.
 """
 # hosts: window
 
