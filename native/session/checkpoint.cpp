@@ -6,7 +6,7 @@ namespace pharos {
 
 namespace {
 
-constexpr StateFileKind kCheckpoint{0x54504b4352484850ull, 1, "checkpoint"};  // "PHHRCKPT"
+constexpr StateFileKind kCheckpoint{0x54504b4352484850ull, 2, "checkpoint"};  // "PHHRCKPT"
 
 struct StoredIdentity {
     RenderIdentity value;

@@ -6,7 +6,7 @@ namespace pharos {
 
 namespace {
 
-constexpr StateFileKind kField{0x454449554750ull, 1, "guide file"};  // "PGUIDE"
+constexpr StateFileKind kField{0x454449554750ull, 2, "guide file"};  // "PGUIDE"
 
 }  // namespace
 

@@ -132,6 +132,16 @@ void GuideController::stay_out() {
     status_.brief = selection_.has_value();
 }
 
+void GuideController::stay_out_if_quiet() {
+    short_ = selection_.has_value();
+}
+
+void GuideController::judge_length() {
+    if (short_ && weights_.quiet()) {
+        stay_out();
+    }
+}
+
 void GuideController::set_budget(const GuideBudget& budget) {
     budget_ = budget;
     plan_next();
@@ -176,6 +186,7 @@ void GuideController::see(const Film& film, std::uint32_t done) {
     // SLIDES guides from pass 1 on: what it shows there is no longer independent of pass 0.
     if (selection_ && !frozen_) {
         weights_.see(film, done);
+        judge_length();
         if (continued_ && done == 2 && !hard_ && weights_.hard()) {
             // Another scene than the easy one before, after a cut say: its trial begins.
             hard_ = true;
@@ -328,6 +339,7 @@ void GuideController::load(StateReader& in) {
     read_state(in);
     StateReader::require((pixel_estimate_.empty() || pixel_estimate_.size() == pixels_) &&
                          weights_.fits(pixels_));
+    judge_length();
 }
 
 void GuideController::load_frozen(StateReader& in) {

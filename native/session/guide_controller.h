@@ -37,6 +37,9 @@ class GuideController {
     // passes count alike. Nothing of it where the guide serves whether it pays or not (SLIDES).
     void stay_out();
 
+    // The same, but only if its first sample shows that light is easy to find.
+    void stay_out_if_quiet();
+
     // For live pictures, before one begins: what a frame may spend. Without it all is spent.
     void set_budget(const GuideBudget& budget);
 
@@ -97,6 +100,7 @@ class GuideController {
   private:
     void calibrate(const std::array<double, 2>& calibration);
     [[nodiscard]] double served_part(const SelectionStatistics& selected) const;
+    void judge_length();
     void judge_hardness(const SelectionStatistics& selected);
 
     void count_rates(const RecordBuffer& records, const SelectionPass& work);
@@ -115,6 +119,7 @@ class GuideController {
     std::uint64_t pixels_;
     std::uint32_t pass_ = 0;
     bool continued_ = false;  // from an earlier picture
+    bool short_ = false;      // too short for a quiet scene
     bool hard_ = false;
     std::array<float, 2> hard_share_{};  // of the guide, at least, at diffuse and glossy vertices
     std::array<float, 2> adjoint_scale_{};

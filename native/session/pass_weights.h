@@ -40,6 +40,9 @@ class PassWeights {
     // Looks at the picture after `done` samples; only the first two matter.
     void see(const Film& film, std::uint32_t done);
 
+    // Light is easy to find, as far as one sample a pixel can tell; known after the first.
+    [[nodiscard]] bool quiet() const { return quiet_; }
+
     // Of the pass that starts with sample `first`, by the colour of the pixel: (x + y) % 2.
     [[nodiscard]] std::array<double, 2> of(std::uint32_t first) const;
 
@@ -50,6 +53,7 @@ class PassWeights {
     friend void state_fields(Archive& archive, PassWeights& weights) {
         FirstPasses& passes = weights.passes_;
         archive(passes.width, passes.height, passes.first, passes.second, weights.hard_);
+        archive(weights.quiet_);
     }
 
     // What was loaded fits a picture of this size.
@@ -57,6 +61,7 @@ class PassWeights {
 
   private:
     FirstPasses passes_;
+    bool quiet_ = false;
     std::array<bool, 2> hard_{};  // by the pixels of this colour
 };
 

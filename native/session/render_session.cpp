@@ -268,11 +268,15 @@ GuideController RenderSession::Impl::make_guide(const Scene& scene) {
         }
     }
     GuideController guide(next.mode, next.scene_box, next.pixels);
+    const std::uint64_t samples = next.pixels * scene.description.settings.samples;
     if (!options.field_learns && !options.field.empty()) {
         freeze_field(options.field, next.mode, guide);
-    } else if (next.pixels * scene.description.settings.samples < options.least_guided_samples &&
-               !passes.wants_any(kGuidePasses)) {
-        guide.stay_out();
+    } else if (!passes.wants_any(kGuidePasses)) {
+        if (samples < options.least_guided_samples) {
+            guide.stay_out();
+        } else if (samples / kQuietSamplesFactor < options.least_guided_samples) {
+            guide.stay_out_if_quiet();
+        }
     }
     return guide;
 }

@@ -68,9 +68,12 @@ struct SessionSnapshot {
 };
 
 // From about so many camera samples on learning pays for itself in hard scenes
-// (`tests/benchmark/run` at 16 samples of 128 x 96 pixels, 196 608 in all); easy ones still lose
-// there.
+// (`tests/benchmark/run` at 16 samples of 128 x 96 pixels, 196 608 in all).
 inline constexpr std::uint64_t kLeastGuidedSamples = 160000;
+
+// Where the first sample of each pixel shows that light is easy to find it takes so many times as
+// many.
+inline constexpr std::uint64_t kQuietSamplesFactor = 8;
 
 struct SessionOptions {
     unsigned threads = 0;  // 0: one per core
@@ -84,8 +87,9 @@ struct SessionOptions {
     // goes on learning from where it was, or, where it does not fit, starts anew and reports why.
     std::vector<std::byte> field;
     bool field_learns = false;
-    // Camera samples in all under which a picture is unguided, where no field is given and none of
-    // the guide's passes is asked for. 0: as where what is learned serves the next picture.
+    // Camera samples in all under which a picture is unguided (kQuietSamplesFactor times as many in
+    // quiet scenes), where no field is given and none of the guide's passes is asked for. 0: as
+    // where what is learned serves the next picture.
     std::uint64_t least_guided_samples = 0;
     CheckpointOptions checkpoint;
 };

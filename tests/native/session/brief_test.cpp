@@ -41,6 +41,42 @@ TEST(Brief, OneSampleMoreAndItLearns) {
     EXPECT_GT(learning.progress.guiding.snapshots, 0u);
 }
 
+// Light that is easy to find takes more samples until learning pays: that of a box that glows does.
+TEST(Brief, QuietPictureIsLeftAloneForLonger) {
+    const auto glowing = [](GuidingMode mode) {
+        SceneDescription d = emitting_box(kWidth, kHeight);
+        d.settings.samples = kSamples;
+        d.settings.guiding = mode;
+        return d;
+    };
+    const Rendered brief = render(glowing(GuidingMode::Neural), guided_from(kAll));
+    EXPECT_EQ(guide_state(brief.progress.guiding), GuideState::Brief);
+    EXPECT_EQ(brief.items("train"), 0u);
+    EXPECT_EQ(brief.combined, render(glowing(GuidingMode::Off)).combined);
+    const Rendered learning =
+        render(glowing(GuidingMode::Neural), guided_from(kAll / kQuietSamplesFactor));
+    EXPECT_GT(learning.items("train"), 0u);
+}
+
+// What its first sample showed is in its checkpoint.
+TEST(Brief, QuietPictureStaysQuietWhenItGoesOn) {
+    const ScratchFolder folder;
+    SceneDescription d = emitting_box(kWidth, kHeight);
+    d.settings.guiding = GuidingMode::Neural;
+    d.settings.samples = 4;
+    SessionOptions options = guided_from(kAll);
+    options.checkpoint.path = folder.file("checkpoint");
+    const Rendered begun = render(SceneDescription(d), options);
+    EXPECT_EQ(guide_state(begun.progress.guiding), GuideState::Brief);
+    d.settings.samples = kSamples;
+    options.checkpoint.resume = Resume::Must;
+    const Rendered resumed = render(SceneDescription(d), options);
+    EXPECT_EQ(resumed.progress.samples, kSamples) << resumed.progress.error;
+    EXPECT_EQ(resumed.items("train"), 0u);
+    d.settings.guiding = GuidingMode::Off;
+    EXPECT_EQ(resumed.combined, render(std::move(d)).combined);
+}
+
 TEST(Brief, GuidePassesAreLearnedFor) {
     SceneDescription d = rooms();
     d.passes.wanted |= pass_bit(FilmPass::GuideDirection);

@@ -60,6 +60,24 @@ TEST(PassWeights, GrowWhereLightIsHardToFind) {
     }
 }
 
+// Known after one sample a pixel, whatever is painted on what is lit.
+TEST(PassWeights, QuietLightIsSeenInTheFirstSample) {
+    for (const bool painted : {false, true}) {
+        for (const double chance : {0.7, 0.05}) {
+            Film film(frame(64));
+            RareLight light(chance, 4);
+            for (std::uint32_t i = 0; i < 64 * 64; ++i) {
+                const bool dark = painted && (i % 64 / 8 + i / 64 / 8) % 2 == 0;
+                film.add(i, {.radiance = Rgb(light() * (dark ? 0.5f : 1.0f))}, 1.0, true);
+            }
+            PassWeights weights;
+            EXPECT_FALSE(weights.quiet());
+            weights.see(film, 1);
+            EXPECT_EQ(weights.quiet(), chance > 0.1) << painted << " " << chance;
+        }
+    }
+}
+
 // Variance of a Bernoulli sample of mean 1 is 1 / chance - 1.
 TEST(PassWeights, VarianceIsThatOfOneSample) {
     constexpr double kChance = 0.25;
