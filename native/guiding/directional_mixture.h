@@ -27,6 +27,9 @@ struct alignas(32) VmfMixture {
     // Integral of the learned quantity over the sphere: of luminance * |cos| by default
     // (irradiance-like)
     float A = 0.0f;
+    // pi times what comes in along the lobe of the material that the mixture was multiplied by, A
+    // where there is none: times albedo / pi it is the radiance that leaves.
+    float expected = 0.0f;
     std::int32_t lobe_count = 1;
 
     [[nodiscard]] VmfLobe lobe(int k) const { return {Vec3(mu_x[k], mu_y[k], mu_z[k]), kappa[k]}; }
@@ -53,7 +56,8 @@ inline namespace PHAROS_ISA_NAMESPACE {
 
 // The mixture times exp(kappa_b (dot(w, axis) - 1)), renormalised: closed form, since the product
 // of two vMF lobes is one. For a reflecting lobe of the material: axis = reflect(wo, n) and kappa_b
-// = product_kappa(). Where everything underflows, the mixture before the product. A is kept.
+// = product_kappa(). Where everything underflows, the mixture before the product. A is kept,
+// `expected` is that of the product.
 [[nodiscard]] inline VmfMixture multiply_lobe(const VmfMixture& mixture,
                                               const Vec3& axis,
                                               float kappa_b) {
@@ -95,6 +99,8 @@ inline namespace PHAROS_ISA_NAMESPACE {
     *reinterpret_cast<Lobes8*>(result.kappa) = product_kappa;
     *reinterpret_cast<Lobes8*>(result.coefficient) = weight * normalization;
     result.A = mixture.A;
+    // Of A, the part that the normalised lobe lets through: the integral of the product of both.
+    result.expected = mixture.A * kPi * std::exp(largest) * total * vmf::normalization<float>(kb);
     result.lobe_count = mixture.lobe_count;
     return result;
 }

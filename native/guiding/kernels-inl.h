@@ -107,6 +107,7 @@ inline void write_mixtures(
     const V integral = decoded.integral * view.radiance_scale;
     for (int i = 0; i < std::min(kLanes, count); ++i) {
         mixtures[i].A = integral[i];
+        mixtures[i].expected = integral[i];
         mixtures[i].lobe_count = config.lobes;
     }
     // Non-finite weights must not reach a path: such a vertex is sampled uniformly.

@@ -26,8 +26,8 @@ struct GuidingContext {
     bool probe = false;  // ask the field at every vertex of recorded paths, to judge it
     bool record = false;
     float record_probability = 0.0f;  // of a camera sample
-    // Weight window where the guide is on, by A times this as the adjoint, at diffuse and at glossy
-    // vertices; 0: roulette by the albedos there too.
+    // Weight window where the guide is on, by what the mixture expects times this as the adjoint,
+    // at diffuse and at glossy vertices; 0: roulette by the albedos there too.
     std::array<float, 2> adjoint_scale{};
     WeightWindow window;
     std::span<const float> pixel_estimate;  // luminance per pixel of the window; empty: none yet

@@ -94,7 +94,8 @@ void complete_record(
     record.selection.pdf_used = sample.pdf;
     if (guide.mixture != nullptr) {
         record.judged = true;
-        record.selection.expected = luminance(batch.traits[s].albedo) * guide.mixture->A * kInvPi;
+        record.selection.expected =
+            luminance(batch.traits[s].albedo) * guide.mixture->expected * kInvPi;
         const float smooth = 1.0f - guide.delta_probability;
         record.selection.pdf_guide = smooth * mixture_pdf(*guide.mixture, sample.wi);
         record.selection.pdf_bsdf =
@@ -153,7 +154,7 @@ void scatter(const RenderContext& context,
     continue_path(context, s, path, *sample, batch);
 }
 
-// Decides by the guide's A where it is in use, else by the product of albedos.
+// Decides by what the guide expects to arrive where it is in use, else by the product of albedos.
 RouletteDecision roulette(const RenderContext& context,
                           std::size_t s,
                           float u,
@@ -165,7 +166,7 @@ RouletteDecision roulette(const RenderContext& context,
     if (adjoint_scale > 0.0f && !guiding.pixel_estimate.empty()) {
         const float pixel = guiding.pixel_estimate[batch.root_pixel[batch.root[path]]];
         const float r = luminance(batch.beta[path] * batch.traits[s].albedo) *
-                        batch.guides[s].mixture->A * (adjoint_scale * kInvPi) / pixel;
+                        batch.guides[s].mixture->expected * (adjoint_scale * kInvPi) / pixel;
         const bool may_split = batch.counters[path].bounce > 0 && batch.paths < batch.capacity;
         return weight_window(guiding.window, r, may_split, u);
     }

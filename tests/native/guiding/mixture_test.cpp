@@ -1,6 +1,7 @@
 // Mixtures of vMF lobes: sampling against density, the closed-form product, extreme lobes.
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -116,7 +117,8 @@ TEST(Mixture, ProductIsNormalisedAndSampled) {
 TEST(Mixture, ProductIsProportionalToBothFactors) {
     Random random(5);
     for (int i = 0; i < 500; ++i) {
-        const VmfMixture mixture = random_mixture(random, 8, 300.0f);
+        VmfMixture mixture = random_mixture(random, 8, 300.0f);
+        mixture.A = random.log_uniform(1e-3f, 1e3f);
         const VmfLobe lobe{random.direction(), random.log_uniform(0.1f, 500.0f)};
         const VmfMixture product = multiply_lobe(mixture, lobe.mu, lobe.kappa);
         EXPECT_EQ(product.A, mixture.A);
@@ -131,6 +133,13 @@ TEST(Mixture, ProductIsProportionalToBothFactors) {
             const double ratio = static_cast<double>(mixture_pdf(product, w)) / factors;
             first = first == 0.0 ? ratio : first;
             ASSERT_NEAR(ratio / first, 1.0, 1e-4) << lobe.kappa;
+        }
+        // The ratio is one over the integral of both: what of A comes in along the lobe.
+        if (first > 0.0) {
+            const double along = static_cast<double>(mixture.A) / first;
+            ASSERT_NEAR(
+                static_cast<double>(product.expected) / (std::numbers::pi * along), 1.0, 1e-3)
+                << lobe.kappa;
         }
     }
 }

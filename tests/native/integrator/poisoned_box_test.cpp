@@ -107,7 +107,7 @@ double error_of(const Box& box) {
 VmfMixture one_lobe(const Vec3& mu, float kappa, float A) {
     VmfMixture mixture;
     set_lobe(mixture, 0, 1.0f, {mu, kappa});
-    mixture.A = A;
+    mixture.A = mixture.expected = A;
     return mixture;
 }
 
@@ -133,7 +133,7 @@ VmfMixture like_a_delta(const Vec3& /*p*/, const Vec3& /*n*/) {
 VmfMixture confused(const Vec3& p, const Vec3& n) {
     VmfMixture mixture;
     mixture.lobe_count = kMaxLobes;
-    mixture.A = std::nanf("");
+    mixture.A = mixture.expected = std::nanf("");
     float kappa = 0.01f;
     Vec3 mu = normalize_or(p, n);
     for (int k = 0; k < kMaxLobes; ++k) {
