@@ -105,8 +105,8 @@ inline namespace PHAROS_ISA_NAMESPACE {
     return result;
 }
 
-// kappa_b for a GGX reflection lobe of alpha = roughness^2; wider than the lobe's own fit, which
-// measured better on learned mixtures. Use it for roughness under about 0.25 only.
+// kappa_b for a GGX reflection lobe of alpha = roughness^2; half of its peak's own, which measured
+// better on learned mixtures. Use it for roughness under about 0.25 only.
 [[nodiscard]] inline float product_kappa(float alpha, float cos_o) {
     return std::min(2000.0f, 0.25f / (alpha * alpha * std::max(cos_o, 0.3f) + 1e-12f));
 }

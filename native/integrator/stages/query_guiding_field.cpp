@@ -1,4 +1,5 @@
 #include "core/color.h"
+#include "integrator/narrow_lobe.h"
 #include "integrator/stages.h"
 
 namespace pharos {
@@ -9,13 +10,6 @@ namespace {
 // it.
 constexpr float kMinGuidedRoughness = 0.05f;
 constexpr float kMinGuidedAlpha = kMinGuidedRoughness * kMinGuidedRoughness;
-// Under this roughness the mixture is multiplied by the reflecting lobe (prototype2, section 2).
-constexpr float kMaxProductRoughness = 0.25f;
-constexpr float kMaxProductAlpha = kMaxProductRoughness * kMaxProductRoughness;
-// Of refracting lobes by their width: the same least one, and one far under what a field tells
-// apart.
-constexpr float kMinProductKappa = 64.0f;
-constexpr float kMaxProductKappa = 2e4f;
 
 constexpr std::uint32_t kLimitSalt = 0x3c6ef372u;
 
@@ -59,57 +53,6 @@ struct LobeSummary {
         summary.guidable /= bsdf.total_sample_weight;
     }
     return summary;
-}
-
-// A lobe of the material as the product takes it; kappa 0: none, or too wide.
-struct NarrowLobe {
-    Vec3 axis{0.0f};
-    float kappa = 0.0f;
-};
-
-[[nodiscard]] NarrowLobe reflected_lobe(const Closure& lobe, const Vec3& wo, float cos_o) {
-    const float alpha = std::sqrt(lobe.alpha_x * lobe.alpha_y);
-    if (alpha > kMaxProductAlpha) {
-        return {};
-    }
-    return {lobe.n * (2.0f * cos_o) - wo, product_kappa(alpha, cos_o)};
-}
-
-// Refraction spreads the half vectors less than reflection does: by the ratio of the solid angles
-// (Walter et al. 2007, eq. 17, at the mean half vector).
-[[nodiscard]] NarrowLobe refracted_lobe(const Closure& lobe, const Vec3& wo, float cos_o) {
-    const float inverse = 1.0f / lobe.eta;
-    const float sin2_t = (1.0f - sqr(cos_o)) * sqr(inverse);
-    if (sin2_t >= 1.0f) {
-        return lobe.type == ClosureType::GgxGlass ? reflected_lobe(lobe, wo, cos_o) : NarrowLobe{};
-    }
-    const float cos_t = std::sqrt(1.0f - sin2_t);
-    const float spread = sqr(cos_o - lobe.eta * cos_t) + 1e-6f;
-    const float kappa = sqr(lobe.eta) * cos_t / (spread * lobe.alpha_x * lobe.alpha_y + 1e-12f);
-    if (kappa < kMinProductKappa) {
-        return {};
-    }
-    return {lobe.n * (cos_o * inverse - cos_t) - wo * inverse, std::min(kappa, kMaxProductKappa)};
-}
-
-// The lobe that the mixture is multiplied by, where the dominant one is narrow.
-[[nodiscard]] NarrowLobe narrow_lobe(const Closure* lobe, const Vec3& wo) {
-    if (lobe == nullptr) {
-        return {};
-    }
-    const float cos_o = std::min(glm::dot(lobe->n, wo), 1.0f);
-    if (cos_o <= 0.0f) {
-        return {};
-    }
-    switch (lobe->type) {
-        case ClosureType::GgxReflection:
-            return reflected_lobe(*lobe, wo, cos_o);
-        case ClosureType::GgxRefraction:
-        case ClosureType::GgxGlass:
-            return refracted_lobe(*lobe, wo, cos_o);
-        default:
-            return {};
-    }
 }
 
 // Opens a record for a vertex of a recorded path.
@@ -231,7 +174,9 @@ std::uint64_t query_guiding_field(const RenderContext& context, PathBatch& batch
     for (std::size_t q = 0; q < queries; ++q) {
         const std::uint32_t s = batch.query_surface[q];
         if (context.guiding.multiplies) {
-            const NarrowLobe lobe = narrow_lobe(batch.query_lobe[q], batch.bsdfs[s].wo);
+            const Closure* dominant = batch.query_lobe[q];
+            const NarrowLobe lobe =
+                dominant == nullptr ? NarrowLobe{} : narrow_lobe(*dominant, batch.bsdfs[s].wo);
             if (lobe.kappa > 0.0f) {
                 batch.mixtures[q] = multiply_lobe(batch.mixtures[q], lobe.axis, lobe.kappa);
             }
