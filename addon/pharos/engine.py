@@ -49,7 +49,8 @@ class PharosRenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, f"Pharos: {problem}")
         else:
             self._render(depsgraph, module)
-        write_flag.leave(visit)
+        # The main thread itself waits for a preview that it has given up.
+        write_flag.leave(visit, lambda: self.is_preview and self.test_break())
 
     def _render(self, depsgraph, module):
         layer = depsgraph.view_layer_eval

@@ -16,12 +16,14 @@ import sys
 import threading
 import time
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
 
 _LOOK_INTERVAL = 0.1  # seconds between looks of the main thread
 _PATIENCE = 0.4  # seconds a callback waits for it, and it for a callback to return
+_GLANCE = 0.01  # seconds between a waiting callback's looks at whether it has to hurry
 
 _at_risk = threading.Event()  # a callback came in while the main thread was in Python
 _leaving: queue.SimpleQueue = queue.SimpleQueue()
@@ -45,14 +47,19 @@ def enter() -> Visit:
     return Visit()
 
 
-def leave(visit: Visit) -> None:
-    """The last call in a callback. Waits for the main thread where that is needed, a while."""
+def leave(visit: Visit, hurried: Callable[[], bool]) -> None:
+    """The last call in a callback. Waits for the main thread where that is needed, a while, and no
+    longer than until hurried() is true: a later callback can do it then."""
     if bpy.app.background or threading.current_thread() is threading.main_thread():
         return
-    if _at_risk.is_set():
-        asked = _Leave(weakref.ref(visit))
-        _leaving.put(asked)
-        asked.main_is_in.wait(_PATIENCE)
+    if not _at_risk.is_set():
+        return
+    asked = _Leave(weakref.ref(visit))
+    _leaving.put(asked)
+    deadline = time.monotonic() + _PATIENCE
+    while not asked.main_is_in.wait(_GLANCE) and time.monotonic() < deadline:
+        if hurried():
+            break
 
 
 class PHAROS_OT_keep_write_flag(bpy.types.Operator):
