@@ -49,8 +49,7 @@ class PharosRenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, f"Pharos: {problem}")
         else:
             self._render(depsgraph, module)
-        # The main thread itself waits for a preview that it has given up.
-        write_flag.leave(visit, lambda: self.is_preview and self.test_break())
+        write_flag.leave(visit, self)
 
     def _render(self, depsgraph, module):
         layer = depsgraph.view_layer_eval

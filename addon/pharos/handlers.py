@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import queue
 import sys
+import traceback
 
 import bpy
 from bpy.app.handlers import persistent
@@ -18,6 +19,7 @@ from .export.report import Entry
 _waiting: queue.SimpleQueue = queue.SimpleQueue()
 _epoch = [0]  # grows whenever pointers may stand for other things than before
 _DUMP_ARGUMENT = "--pharos-dump"
+_FORBIDDEN = "Writing to ID classes"  # how Blender's message begins
 _RENDER_ARGUMENTS = {"-f", "--render-frame", "-a", "--render-anim"}
 
 
@@ -87,8 +89,11 @@ def _deliver() -> float:
         try:
             if scene is not None:
                 write(scene, what)
-        except AttributeError:
-            _waiting.put((write, scene_name, what))
+        except AttributeError as error:
+            if _FORBIDDEN in str(error):
+                _waiting.put((write, scene_name, what))
+            else:
+                traceback.print_exc()
     return 0.5
 
 

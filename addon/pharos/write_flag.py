@@ -16,14 +16,14 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
 
 _LOOK_INTERVAL = 0.1  # seconds between looks of the main thread
-_PATIENCE = 0.4  # seconds a callback waits for it, and it for a callback to return
-_GLANCE = 0.01  # seconds between a waiting callback's looks at whether it has to hurry
+_PATIENCE = 2.0  # seconds a callback waits for it: it may be busy drawing
+_HURRIED_PATIENCE = 0.4  # seconds, of one that is told to stop; and its own for one to return
+_GLANCE = 0.01  # seconds between a waiting callback's looks at whether it is
 
 _at_risk = threading.Event()  # a callback came in while the main thread was in Python
 _leaving: queue.SimpleQueue = queue.SimpleQueue()
@@ -47,18 +47,22 @@ def enter() -> Visit:
     return Visit()
 
 
-def leave(visit: Visit, hurried: Callable[[], bool]) -> None:
-    """The last call in a callback. Waits for the main thread where that is needed, a while, and no
-    longer than until hurried() is true: a later callback can do it then."""
+def leave(visit: Visit, engine) -> None:
+    """The last call in a callback of this engine. Waits for the main thread where that is needed, a
+    while: not when a preview is given up, as the main thread itself waits for its end then. What is
+    not mended here a later callback can mend."""
     if bpy.app.background or threading.current_thread() is threading.main_thread():
         return
     if not _at_risk.is_set():
         return
     asked = _Leave(weakref.ref(visit))
     _leaving.put(asked)
-    deadline = time.monotonic() + _PATIENCE
-    while not asked.main_is_in.wait(_GLANCE) and time.monotonic() < deadline:
-        if hurried():
+    begin = time.monotonic()
+    while not asked.main_is_in.wait(_GLANCE):
+        patience = _PATIENCE
+        if engine.test_break():
+            patience = 0.0 if engine.is_preview else _HURRIED_PATIENCE
+        if time.monotonic() - begin > patience:
             break
 
 
@@ -72,7 +76,7 @@ class PHAROS_OT_keep_write_flag(bpy.types.Operator):
     def execute(self, context):
         """A visit ends with its callback's frame, and Python's lock is held from there until
         Blender has put the flag back: once it is seen here that it ended, the flag is back."""
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + _HURRIED_PATIENCE
         all_left = True
         while not _leaving.empty():
             asked = _leaving.get()
@@ -90,7 +94,8 @@ def _look() -> float:
         try:
             bpy.ops.pharos.keep_write_flag()
         except RuntimeError:  # the flag forbids it already: a later render can mend it
-            _leaving.get().main_is_in.set()
+            while not _leaving.empty():
+                _leaving.get().main_is_in.set()
     return _LOOK_INTERVAL
 
 

@@ -15,8 +15,9 @@ constexpr float kMaxProductAlpha = kMaxProductRoughness * kMaxProductRoughness;
 // Of refracting lobes: the same, by their width, and one far under what a field tells apart.
 constexpr float kMinProductKappa = 32.0f;
 constexpr float kMaxProductKappa = 2e4f;
-// Half vectors spread as a vMF lobe of 1 / alpha^2 does, near their peak: the tails of GGX are
-// wider, and a product somewhat too wide costs less than one too narrow.
+// Of 1 / alpha^2, for the half vectors: an eighth of what their peak has by itself, as GGX has wide
+// tails. Measured in a room behind frosted glass (`frosted`): with four times this the error is 1.8
+// times as large, with a third of it 1.2 times.
 constexpr float kWidening = 0.25f;
 
 NarrowLobe reflected_lobe(const Closure& lobe, const Vec3& wo, float cos_o) {

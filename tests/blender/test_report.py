@@ -93,4 +93,20 @@ def test_a_report_that_may_not_be_written_is_written_later():
     assert len(written) == 2
 
 
+def test_a_report_that_fails_otherwise_is_said_once_and_does_not_stop_the_next():
+    from pharos import handlers
+
+    scene = harness.new_scene(8, 8, 1)
+    written = []
+
+    def wrong(where, what):
+        written.append("wrong")
+        raise AttributeError("no such thing")
+
+    handlers._post(wrong, scene.name, 1)
+    handlers._post(lambda where, what: written.append(what), scene.name, 2)
+    handlers._deliver()
+    assert written == ["wrong", 2]
+
+
 harness.main(globals())

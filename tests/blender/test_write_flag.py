@@ -14,12 +14,13 @@ import steps
 
 ROUNDS = 4
 _drawing = threading.Event()
+_entered = threading.Event()  # the render's callback has begun: panels are quick from then on
 _overlaps = []  # of each render's callback: it came in while a panel was drawn
 
 
 def slow_draw(_panel, _context) -> None:
     """Gives up Python's lock, as a long panel does on a busy machine."""
-    if bpy.app.is_job_running("RENDER"):
+    if bpy.app.is_job_running("RENDER") and not _entered.is_set():
         _drawing.set()
         time.sleep(0.05)
         _drawing.clear()
@@ -38,6 +39,7 @@ def watch_renders() -> None:
 
     def watched(engine, depsgraph, module):
         _overlaps.append(_drawing.is_set())
+        _entered.set()
         render(engine, depsgraph, module)
 
     final.render = watched
@@ -59,6 +61,7 @@ def render() -> None:
     """As F12 does it: on a thread of its own."""
     assert not bpy.app.is_job_running("RENDER")
     bpy.context.scene.pharos.samples = 1500  # long enough that most end outside of a draw
+    _entered.clear()
     assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
 
 
