@@ -14,7 +14,7 @@ namespace pharos {
 
 struct WeightWindow {
     float size = 5.0f;  // upper / lower
-    float min_survival = 0.2f;
+    float min_survival = 0.4f;
     int max_copies = 4;
 };
 

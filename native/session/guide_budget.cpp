@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "guiding/guiding_field.h"
-
 namespace pharos {
 
 namespace {
@@ -55,7 +53,7 @@ double fill_ranks(const GuideRates& rates,
 GuidePlan plan_guide(const GuideBudget& budget, const GuideRates& counted, const GuideWish& wish) {
     GuidePlan plan;
     plan.record_probability = wish.record_probability;
-    plan.visits = kTrainingVisits;
+    plan.visits = wish.visits;
     if (!budget.limited() || wish.pixels == 0) {
         return plan;
     }
@@ -67,7 +65,7 @@ GuidePlan plan_guide(const GuideBudget& budget, const GuideRates& counted, const
     const double recorded = static_cast<double>(wish.record_probability) *
                             std::accumulate(rates.demand.begin(), rates.demand.end(), 0.0);
     const double visits = std::max(recorded,
-                                   std::min(static_cast<double>(kTrainingVisits) / paths,
+                                   std::min(static_cast<double>(wish.visits) / paths,
                                             static_cast<double>(kMaxVisitsOfRecord) * recorded));
     const double records = recorded * budget.costs.vertex + visits * budget.costs.record;
     // Vertices of recorded paths are asked about as it is.

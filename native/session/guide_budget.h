@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "guiding/guiding_field.h"
 #include "integrator/guide_limit.h"
 #include "session/guide_costs.h"
 
@@ -35,8 +36,9 @@ struct GuideRates {
 struct GuideWish {
     std::uint64_t pixels = 0;
     float record_probability = 0.0f;
-    bool guides_proven = false;    // vertices of regions that have proven something
-    bool guides_unproven = false;  // and all others
+    bool guides_proven = false;            // vertices of regions that have proven something
+    bool guides_unproven = false;          // and all others
+    std::size_t visits = kTrainingVisits;  // of training records
 };
 
 struct GuidePlan {

@@ -20,6 +20,11 @@ constexpr double kMaxRecordsPerPass = 524288.0;
     return pass < 8 ? 0.8 : pass < 20 ? 0.4 : 0.2;
 }
 
+// At the start it is steps that learning waits for, not records: in small pictures each is visited
+// several times (kMaxVisitsOfRecord), so many visits in a pass.
+constexpr std::uint32_t kEagerPasses = 10;
+constexpr std::size_t kEagerVisits = 4 * kTrainingVisits;
+
 // Where paths are quiet, learning takes no more than a few percent of a pass: records a vertex.
 constexpr double kEasyRecords = 0.06;
 constexpr float kFirstRecordProbability = 0.1f;
@@ -42,13 +47,11 @@ constexpr std::uint32_t kEasyEstimateEveryPass = 4;
 constexpr std::uint32_t kHardPassPart = 16;
 constexpr std::uint32_t kEasyPassPart = 4;
 
-// The adjoint must have been learned before paths are killed by it: after so many paths.
-constexpr std::uint64_t kPathsBeforeRoulette = 1u << 17;
-// A guide that has learned another state of the scene follows sooner than one that starts.
-constexpr std::uint64_t kPathsBeforeRouletteAfterEdit = 1u << 15;
-constexpr std::uint32_t kMinPassesBeforeRoulette = 2;
-constexpr std::uint32_t kMaxPassesBeforeRoulette = 16;
-// and its sum over all records must be that of what arrived within this factor.
+// The first pass with roulette by the adjoint: two that nothing has shaped decide how hard the
+// picture is. It may come so soon since hardly a path is killed by what was learned by then
+// (WeightWindow::min_survival), and splitting feeds the training where light is rare.
+constexpr std::uint32_t kFirstRoulettePass = 2;
+// The adjoint's sum over all records must be that of what arrived within this factor.
 constexpr double kMaxCalibration = 4.0;
 
 // A frame that goes on from another learns as from this pass on: it starts guided, and with as many
@@ -163,6 +166,7 @@ void GuideController::plan_next() {
     GuideWish wish;
     wish.pixels = pixels_;
     wish.record_probability = record_probability_;
+    wish.visits = hard_ && pass_ < kEagerPasses ? kEagerVisits : kTrainingVisits;
     if (field_ && field_->generation() > 0) {
         wish.guides_unproven = !selection_ || serves_unproven();
         wish.guides_proven = wish.guides_unproven || status_.guided_share > 0.0;
@@ -220,12 +224,7 @@ GuidingContext GuideController::next_pass() const {
     context.selection_serves = status_.guided_share > 0.0;
     context.fixed_share = hard_share_;
     context.probe = !frozen_;
-    const std::uint64_t paths = continued_ ? kPathsBeforeRouletteAfterEdit : kPathsBeforeRoulette;
-    const auto patience = static_cast<std::uint32_t>(
-        std::clamp<std::uint64_t>(paths / std::max<std::uint64_t>(1, pixels_),
-                                  kMinPassesBeforeRoulette,
-                                  kMaxPassesBeforeRoulette));
-    if (pass_ >= patience) {
+    if (pass_ >= kFirstRoulettePass) {
         context.adjoint_scale = adjoint_scale_;
     }
     return context;

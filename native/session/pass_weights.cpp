@@ -20,8 +20,8 @@ constexpr int kDimmings = 2;    // of what is brighter than usual, to find it
 constexpr int kRadius = 3;
 constexpr double kUnit = 1 << 20;  // of what is summed up, relative to the mean
 constexpr double kMaxRelative = 1e9;
-// 1, 1, 2, 3, 4, 4, ...: near the inverse of the variance that guided passes were seen to have.
-constexpr double kLastWeight = 4.0;
+// 1, 1, 2, 3, ... 8, 8, ...: near the inverse of the variance that guided passes were seen to have.
+constexpr double kLastWeight = 8.0;
 
 // Sums over the windows of 2 kRadius + 1 pixels a side, each from the next: whole numbers of
 // kUnit, so that nothing is lost on the way.

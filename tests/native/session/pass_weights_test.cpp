@@ -54,7 +54,7 @@ TEST(PassWeights, GrowWhereLightIsHardToFind) {
             add_pass(film, weights, light);
         }
         EXPECT_EQ(weights.hard(), chance < 0.1);
-        const double last = chance < 0.1 ? 4.0 : 1.0;
+        const double last = chance < 0.1 ? 8.0 : 1.0;
         EXPECT_EQ(weights.of(100), (std::array{last, last}));
         EXPECT_LE(weights.of(2)[0], weights.of(3)[0]);
     }
