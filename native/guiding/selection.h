@@ -22,6 +22,9 @@
 
 namespace pharos {
 
+// Of the guide at a vertex: the material always keeps a quarter.
+inline constexpr float kLargestShare = 0.75f;
+
 // One vertex of a recorded path; all f are luminances of f |cos| L, all pdfs per solid angle.
 struct SelectionRecord {
     Vec3 position;

@@ -16,7 +16,7 @@
 namespace pharos {
 
 inline constexpr std::size_t kShares = 4;
-inline constexpr std::array<float, kShares> kShare = {0.0f, 0.25f, 0.5f, 0.75f};
+inline constexpr std::array<float, kShares> kShare = {0.0f, 0.25f, 0.5f, kLargestShare};
 
 inline constexpr double kPriorCount = 128.0;  // weight of the parent in a cell's mean, and so on up
 

@@ -34,7 +34,7 @@ constexpr float kSlidesShare = 0.5f;
 // region by region. There it serves everywhere at once, in every pass before which the second
 // moments of all records together speak for it: they speak against a guide that learned nothing, or
 // lies, from the first pass on.
-constexpr float kMaxHardShare = 0.5f;
+constexpr float kMaxHardShare = kLargestShare;
 constexpr std::uint32_t kHardTrialPasses = 12;
 constexpr double kHardMaxMomentRatio = 0.97;        // after so many passes; until then
 constexpr double kHardFirstMaxMomentRatio = 0.999;  // any gain will do

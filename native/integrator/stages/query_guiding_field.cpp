@@ -120,12 +120,15 @@ void decide_vertex(const RenderContext& context, std::size_t s, PathBatch& batch
         return;
     }
     const SurfaceInteraction& surface = batch.surfaces[s];
-    const float proven = guiding.selection == nullptr
+    const float fixed = guiding.fixed_share[glossy ? 1 : 0];
+    // No need to look where nothing could come of it.
+    const bool decided = fixed >= kLargestShare && !recorded && !guiding.limit.active();
+    const float proven = guiding.selection == nullptr || decided
                              ? 0.0f
                              : guiding.selection->alpha(surface.p, surface.ns, glossy);
     const std::uint32_t rank = guide_rank(batch.counters[path].bounce, proven);
     const bool asked = recorded && guiding.probe;
-    guide.share = std::max(guiding.fixed_share[glossy ? 1 : 0], proven);
+    guide.share = std::max(fixed, proven);
     if (guiding.limit.active() && !asked && !guiding.limit.admits(rank, limit_bits(path, batch))) {
         guide.share = 0.0f;
     }
