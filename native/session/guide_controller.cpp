@@ -35,6 +35,7 @@ constexpr float kSlidesShare = 0.5f;
 // moments of all records together speak for it: they speak against a guide that learned nothing, or
 // lies, from the first pass on.
 constexpr float kMaxHardShare = kLargestShare;
+constexpr float kMaxDoubtfulShare = 0.5f;  // where A is not what arrives: what else is wrong?
 constexpr std::uint32_t kHardTrialPasses = 12;
 constexpr double kHardMaxMomentRatio = 0.97;        // after so many passes; until then
 constexpr double kHardFirstMaxMomentRatio = 0.999;  // any gain will do
@@ -399,7 +400,8 @@ void GuideController::judge_hardness(const SelectionStatistics& selected) {
         const bool gains = best.moment_ratio < kHardFirstMaxMomentRatio;
         // The weight window adds to what the moments can see: more than the best share, while it
         // still gains.
-        const float share = std::min(std::max(best.share, best.largest), kMaxHardShare);
+        const float most = adjoint_scale_[kind] > 0.0f ? kMaxHardShare : kMaxDoubtfulShare;
+        const float share = std::min(std::max(best.share, best.largest), most);
         hard_share_[kind] = hard_ && gains ? share : 0.0f;
     }
 }
