@@ -2,6 +2,10 @@
 // (Urena, Fajardo, King 2013). It spans [x0, x1] x [y0, y1] at height z, |z| > 0.
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <cstddef>
+
 #include "core/math.h"
 #include "sampling/warps.h"
 
@@ -16,15 +20,20 @@ struct SphericalRectangle {
     // Corner angles are acos(-n_i . n_j), and the sides' normals are such that the products reduce
     // to their z components; acos(-q) = pi/2 + asin(q) leaves no large terms to cancel.
     [[nodiscard]] static SphericalRectangle make(const Vec2& lower, const Vec2& upper, float z) {
-        const float zz = z * z;
-        const float n0 = -lower.y / std::sqrt(zz + lower.y * lower.y);
-        const float n1 = upper.x / std::sqrt(zz + upper.x * upper.x);
-        const float n2 = upper.y / std::sqrt(zz + upper.y * upper.y);
-        const float n3 = -lower.x / std::sqrt(zz + lower.x * lower.x);
-        const float a2 = std::asin(n2 * n3);
-        const float a3 = std::asin(n3 * n0);
-        const float excess = std::asin(n0 * n1) + std::asin(n1 * n2) + a2 + a3;
-        return {lower.x, upper.x, lower.y, upper.y, z, n0, n2, excess, kPi - a2 - a3};
+        // All four sides at once.
+        const std::array<float, 4> side{-lower.y, upper.x, upper.y, -lower.x};
+        std::array<float, 4> n;
+        std::array<float, 4> angle;
+        for (std::size_t i = 0; i < 4; ++i) {
+            n[i] = side[i] / std::sqrt(z * z + side[i] * side[i]);
+        }
+        const std::array<float, 4> next{n[1], n[2], n[3], n[0]};
+        for (std::size_t i = 0; i < 4; ++i) {
+            angle[i] = arcsine(n[i] * next[i]);
+        }
+        const float excess = (angle[0] + angle[1]) + (angle[2] + angle[3]);
+        return {
+            lower.x, upper.x, lower.y, upper.y, z, n[0], n[2], excess, kPi - angle[2] - angle[3]};
     }
 
     // The point (x, y) of the rectangle.
@@ -32,10 +41,9 @@ struct SphericalRectangle {
         const float height = std::abs(z);
         const SinCos au = sincos_turns((u.x * solid_angle + k) * (0.5f * kInvPi));
         const float fu = (au.cos * b0 - b1) / (au.sin == 0.0f ? 1e-12f : au.sin);
-        const float cu = std::copysign(1.0f, fu) / std::sqrt(fu * fu + b0 * b0);
-        const float cu_limited = std::clamp(cu, -1.0f, 1.0f);
-        const float across = safe_sqrt(1.0f - cu_limited * cu_limited);
-        const float x = std::clamp(cu_limited * height / std::max(across, 1e-12f), x0, x1);
+        // cos u = +-1 / sqrt(fu^2 + b0^2), and x = height cot u
+        const float across2 = std::max(fu * fu + b0 * b0 - 1.0f, 1e-24f);
+        const float x = std::clamp(std::copysign(height / std::sqrt(across2), fu), x0, x1);
         const float d2 = x * x + height * height;
         const float h0 = y0 / std::sqrt(d2 + y0 * y0);
         const float h1 = y1 / std::sqrt(d2 + y1 * y1);
