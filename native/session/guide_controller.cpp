@@ -35,7 +35,9 @@ constexpr float kSlidesShare = 0.5f;
 // moments of all records together speak for it: they speak against a guide that learned nothing, or
 // lies, from the first pass on.
 constexpr float kMaxHardShare = kLargestShare;
-constexpr float kMaxDoubtfulShare = 0.5f;  // where A is not what arrives: what else is wrong?
+// Where A is not what arrives the densities may be wrong as well, and a guide that takes so much
+// would narrow on its own samples.
+constexpr float kMaxDoubtfulShare = 0.5f;
 constexpr std::uint32_t kHardTrialPasses = 12;
 constexpr double kHardMaxMomentRatio = 0.97;        // after so many passes; until then
 constexpr double kHardFirstMaxMomentRatio = 0.999;  // any gain will do
@@ -49,7 +51,7 @@ constexpr std::uint32_t kHardPassPart = 16;
 constexpr std::uint32_t kEasyPassPart = 4;
 
 // The first pass with roulette by the adjoint: two that nothing has shaped decide how hard the
-// picture is. It may come so soon since hardly a path is killed by what was learned by then
+// picture is. It may come so soon since two of five paths survive whatever was learned by then
 // (WeightWindow::min_survival), and splitting feeds the training where light is rare.
 constexpr std::uint32_t kFirstRoulettePass = 2;
 // The adjoint's sum over all records must be that of what arrived within this factor.
